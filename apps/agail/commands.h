@@ -1,0 +1,18 @@
+// The sub-commands, one file each. Each adds itself to the application; its callback does the work, prints
+// results to stdout and throws InputError (exit 2) or anything else (exit 1).
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace agail {
+
+void add_envs(CLI::App& app);
+void add_train(CLI::App& app);
+void add_record(CLI::App& app);
+void add_mask(CLI::App& app);
+void add_inspect(CLI::App& app);
+void add_eval(CLI::App& app);
+void add_bench(CLI::App& app);
+void add_convert(CLI::App& app);
+
+}  // namespace agail

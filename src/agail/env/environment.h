@@ -1,0 +1,72 @@
+// What every environment is: Gymnasium's semantics, with the time limit inside.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "agail/base/random.h"
+#include "agail/base/spaces.h"
+
+namespace agail {
+
+struct EnvironmentSpec {
+  std::string id;  // Gymnasium's, e.g. "Hopper-v5"
+  int observation_dim = 0;
+  bool observation_is_float32 = false;  // Gymnasium's dtype; values are handed out as double
+  ActionSpace action;
+  int max_episode_steps = 0;
+};
+
+struct StepResult {
+  double reward = 0;
+  bool terminated = false;  // the task ended: no value beyond this state
+  bool truncated = false;   // the time limit ended it: bootstrap from the value of this state
+  bool diverged = false;    // the simulation broke down; also terminated, reward 0, last finite observation kept
+};
+
+class Environment {
+ public:
+  virtual ~Environment() = default;
+
+  const EnvironmentSpec& spec() const { return spec_; }
+  int elapsed_steps() const { return elapsed_; }
+
+  // Starts an episode.
+  void reset(RandomStream& random);
+
+  // One step. `action`: spec().action.dim floats (discrete: one, the index), not clipped by us; as in Gymnasium.
+  StepResult step(std::span<const float> action);
+
+  // spec().observation_dim values, of the current state.
+  virtual std::span<const double> observation() const = 0;
+
+  // The whole state, elapsed steps included: an environment restored from it continues bit for bit.
+  std::vector<double> save() const;
+  // Throws InputError if `state` is not of this environment's size.
+  void restore(std::span<const double> state);
+
+ protected:
+  explicit Environment(EnvironmentSpec spec) : spec_(std::move(spec)) {}
+  virtual void do_reset(RandomStream& random) = 0;
+  virtual StepResult do_step(std::span<const float> action) = 0;  // truncated is set by step()
+  virtual std::vector<double> do_save() const = 0;
+  virtual void do_restore(std::span<const double> state) = 0;
+
+ private:
+  EnvironmentSpec spec_;
+  int elapsed_ = 0;
+};
+
+// Built-in ids, in the order of `agail envs`.
+std::vector<std::string> environment_ids();
+
+// Throws InputError, naming the nearest id, if `id` is unknown. Models are compiled once a process and shared.
+std::unique_ptr<Environment> make_environment(const std::string& id);
+
+// The spec without building an environment.
+EnvironmentSpec environment_spec(const std::string& id);
+
+}  // namespace agail
