@@ -1,0 +1,28 @@
+// Files that are either whole or absent, whatever happens while they are written.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace agail {
+
+// Temporary name in the same folder, fsync, rename, fsync of the folder: after a crash at any
+// moment `path` holds the old content or the new one. SystemError (path, reason) if the machine
+// fails; InputError if `path` is a folder.
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+
+// Creates a folder that the user named (and its parents) and makes sure that files can be created
+// in it: InputError if not. For an output file, pass its parent; an empty path is the current
+// folder.
+void create_output_folder(const std::filesystem::path& folder);
+
+// InputError if the file cannot be opened or is larger than `max_bytes`; SystemError if reading
+// fails.
+std::vector<std::uint8_t> read_file(const std::filesystem::path& path,
+                                    std::size_t max_bytes = std::size_t{1} << 32);
+
+}  // namespace agail

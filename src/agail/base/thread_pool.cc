@@ -1,0 +1,102 @@
+#include "agail/base/thread_pool.h"
+
+#include <string>
+#include <system_error>
+#include <utility>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include "agail/base/error.h"
+
+namespace agail {
+namespace {
+
+void pause() {
+#if defined(__x86_64__)
+  _mm_pause();
+#endif
+}
+
+// Waits until `value` is no longer `old`: jobs follow each other closely, so a short spin (some
+// tens of microseconds) usually saves the two system calls; then it sleeps.
+template <class T>
+void wait_while_equal(const std::atomic<T>& value, T old) {
+  for (int spin = 0; spin < 1000; ++spin) {
+    if (value.load(std::memory_order_acquire) != old) return;
+    pause();
+  }
+  value.wait(old, std::memory_order_acquire);
+}
+
+}  // namespace
+
+ThreadPool::ThreadPool(int threads) {
+  AGAIL_CHECK(threads >= 1);
+  workers_.reserve(static_cast<std::size_t>(threads - 1));
+  try {
+    for (int worker = 1; worker < threads; ++worker)
+      workers_.emplace_back([this, worker] { work(worker); });
+  } catch (const std::system_error& error) {
+    stopping_ = true;
+    ++job_number_;
+    job_number_.notify_all();
+    for (std::thread& worker : workers_) worker.join();
+    throw SystemError("cannot start " + std::to_string(threads) + " threads: " + error.what());
+  }
+}
+
+ThreadPool::~ThreadPool() {
+  stopping_ = true;
+  ++job_number_;
+  job_number_.notify_all();
+  for (std::thread& worker : workers_) worker.join();
+}
+
+void ThreadPool::run_erased(int tasks, Call call, void* function) {
+  if (tasks <= 0) return;
+  AGAIL_CHECK(!running_.exchange(true));
+  call_ = call;
+  function_ = function;
+  tasks_ = tasks;
+  next_task_.store(0, std::memory_order_relaxed);
+  const bool alone = workers_.empty() || tasks == 1;
+  if (!alone) {
+    busy_workers_.store(static_cast<int>(workers_.size()), std::memory_order_relaxed);
+    job_number_.fetch_add(1, std::memory_order_release);
+    job_number_.notify_all();
+  }
+  take_tasks(0);
+  if (!alone)
+    for (int busy; (busy = busy_workers_.load(std::memory_order_acquire)) != 0;)
+      wait_while_equal(busy_workers_, busy);
+  running_ = false;
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+}
+
+void ThreadPool::work(int worker) {
+  for (unsigned seen = 0;; ++seen) {
+    wait_while_equal(job_number_, seen);
+    if (stopping_) return;
+    take_tasks(worker);
+    if (busy_workers_.fetch_sub(1, std::memory_order_acq_rel) == 1) busy_workers_.notify_one();
+  }
+}
+
+void ThreadPool::take_tasks(int worker) {
+  int task;
+  while ((task = next_task_.fetch_add(1, std::memory_order_relaxed)) < tasks_) {
+    try {
+      call_(function_, task, worker);
+    } catch (...) {
+      const std::lock_guard lock(failure_mutex_);
+      if (!failure_ || task < failed_task_) {
+        failure_ = std::current_exception();
+        failed_task_ = task;
+      }
+    }
+  }
+}
+
+}  // namespace agail

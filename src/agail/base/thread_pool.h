@@ -1,0 +1,65 @@
+// Threads for work that is cut into numbered tasks. Which worker takes which task is left to
+// chance, so results must depend on the task's number only (see design: exactness).
+#pragma once
+
+#include <atomic>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <vector>
+
+#include "agail/base/cpu_quota.h"  // default_threads()
+
+namespace agail {
+
+class ThreadPool {
+ public:
+  explicit ThreadPool(int threads);  // >= 1, the caller of run() included
+  ~ThreadPool();
+  ThreadPool(const ThreadPool&) = delete;
+  ThreadPool& operator=(const ThreadPool&) = delete;
+
+  int threads() const { return static_cast<int>(workers_.size()) + 1; }
+
+  // Calls f(task, worker) once for each task in [0, tasks), worker in [0, threads()), and returns
+  // when all are done. Does not allocate. If tasks throw, the others still run, and the exception
+  // of the lowest task is thrown here. One run at a time, and none from inside a task.
+  template <class F>
+  void run(int tasks, F&& f) {
+    using Function = std::remove_reference_t<F>;
+    run_erased(
+        tasks,
+        [](void* function, int task, int worker) {
+          (*static_cast<Function*>(function))(task, worker);
+        },
+        const_cast<void*>(static_cast<const void*>(std::addressof(f))));
+  }
+
+ private:
+  using Call = void (*)(void* function, int task, int worker);
+
+  void run_erased(int tasks, Call call, void* function);
+  void work(int worker);
+  void take_tasks(int worker);
+
+  // The job. Written by run() before `job_number_` announces it, read by workers after that.
+  Call call_ = nullptr;
+  void* function_ = nullptr;
+  int tasks_ = 0;
+
+  alignas(64) std::atomic<unsigned> job_number_{0};
+  alignas(64) std::atomic<int> next_task_{0};
+  alignas(64) std::atomic<int> busy_workers_{0};
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> running_{false};
+
+  std::mutex failure_mutex_;
+  std::exception_ptr failure_;
+  int failed_task_ = 0;
+
+  std::vector<std::thread> workers_;
+};
+
+}  // namespace agail
