@@ -1,0 +1,94 @@
+#include "agail/demos/dataset_location.h"
+
+#include <cctype>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+
+#include "agail/base/error.h"
+
+namespace agail {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::regex& id_form() {
+  static const std::regex form(R"(([-\w][-\w/]*[-\w]/)?[-\w]+-v\d{1,9})");
+  return form;
+}
+
+// The folder of main_data.hdf5: Minari's dataset folder has it in data/, but people pass data/
+// itself, too.
+bool locate_in_folder(const fs::path& folder, DatasetLocation& location) {
+  for (const fs::path& data : {folder / "data", folder}) {
+    std::error_code error;
+    if (fs::is_regular_file(data / "main_data.hdf5", error)) {
+      location.data = (data / "main_data.hdf5").string();
+      const bool described = fs::is_regular_file(data / "metadata.json", error);
+      location.metadata = described ? (data / "metadata.json").string() : "";
+      return true;
+    }
+    if (fs::is_regular_file(data / "metadata.json", error))
+      throw InputError(folder.string() +
+                       " is a Minari dataset without main_data.hdf5; it is incomplete or in "
+                       "another format, which "
+                       "Minari converts to hdf5");
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string minari_root() {
+  if (const char* root = std::getenv("MINARI_DATASETS_PATH")) return root;
+  const char* home = std::getenv("HOME");
+  return ((home == nullptr ? fs::path(".") : fs::path(home)) / ".minari" / "datasets").string();
+}
+
+bool is_single_file(const std::string& path) { return fs::path(path).extension() == ".hdf5"; }
+
+DatasetLocation locate_dataset(const std::string& path_or_id) {
+  DatasetLocation location;
+  std::error_code error;
+  const fs::path path(path_or_id);
+  if (fs::is_directory(path, error)) {
+    if (locate_in_folder(path, location)) return location;
+  } else if (fs::exists(path, error)) {
+    location.data = path_or_id;
+    return location;
+  }
+  if (std::regex_match(path_or_id, id_form())) {
+    if (locate_in_folder(fs::path(minari_root()) / path, location)) return location;
+    if (!fs::exists(path, error))
+      throw InputError(path_or_id + " is neither here nor among Minari's datasets in " +
+                       minari_root() + "; `minari download " + path_or_id +
+                       "` fetches published ones");
+  }
+  if (fs::is_directory(path, error))
+    throw InputError(path_or_id + " is a folder without data/main_data.hdf5, so no Minari dataset");
+  throw InputError(
+      path_or_id +
+      " does not exist; give a .hdf5 file, a Minari dataset folder or a Minari dataset id");
+}
+
+std::string dataset_id_for(const std::string& folder) {
+  std::error_code error;
+  const fs::path here = fs::weakly_canonical(fs::absolute(folder), error);
+  const fs::path root = fs::weakly_canonical(fs::absolute(minari_root()), error);
+  const std::string below = here.lexically_relative(root).generic_string();
+  if (!below.empty() && below != "." && !below.starts_with("..")) {
+    if (!std::regex_match(below, id_form()))
+      throw InputError(folder +
+                       " lies among Minari's datasets, where names end in a version; call it " +
+                       folder + "-v0");
+    return below;
+  }
+  std::string name = here.filename().string();
+  for (char& c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_') c = '-';
+  if (name.empty()) name = "demonstrations";
+  return std::regex_match(name, id_form()) ? name : name + "-v0";
+}
+
+}  // namespace agail

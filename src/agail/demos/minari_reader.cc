@@ -1,0 +1,198 @@
+#include "agail/demos/minari_reader.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "agail/base/atomic_file.h"
+#include "agail/base/error.h"
+#include "agail/demos/dataset_location.h"
+#include "agail/demos/gymnasium_spec.h"
+#include "agail/demos/hdf5.h"
+#include "agail/demos/metadata_keys.h"
+#include "agail/demos/read_episode.h"
+#include "agail/demos/spaces_json.h"
+
+namespace agail {
+namespace {
+
+using nlohmann::json;
+
+// The metadata of a single file: the attributes of its root that Minari or we would write.
+json root_metadata(const hdf5::Group& root) {
+  json metadata = json::object();
+  for (const char* key : kTextKeys)
+    if (const auto text = root.text_attribute(key)) metadata[key] = *text;
+  for (const char* key : kListKeys) {
+    const auto text = root.text_attribute(key);
+    if (!text) continue;
+    json list = json::parse(*text, nullptr, false);
+    metadata[key] = list.is_array() ? list : json::array({*text});
+  }
+  if (const auto count = root.integer_attribute("total_episodes"))
+    metadata["total_episodes"] = *count;
+  return metadata;
+}
+
+std::string text_of(const json& metadata, const char* key) {
+  return metadata.contains(key) && metadata[key].is_string() ? metadata[key].get<std::string>()
+                                                             : "";
+}
+
+std::string environment_of(const json& metadata, const std::string& where) {
+  const std::string spec = text_of(metadata, "env_spec");
+  if (spec.empty()) return "";
+  const json parsed = parse_python_json(spec, where + ": env_spec");
+  if (!parsed.is_object() || !parsed.contains("id") || !parsed["id"].is_string() ||
+      !is_gymnasium_id(parsed["id"].get<std::string>()))
+    throw InputError(
+        where +
+        ": env_spec names no environment; its \"id\" must be a Gymnasium id such as Hopper-v5");
+  return parsed["id"].get<std::string>();
+}
+
+// The episode groups in the order of their numbers.
+std::vector<std::string> episode_names(const hdf5::Group& root) {
+  std::vector<std::pair<std::uint64_t, std::string>> numbered;
+  for (const std::string& name : root.names()) {
+    constexpr std::string_view kPrefix = "episode_";
+    if (!name.starts_with(kPrefix)) continue;
+    std::uint64_t number = 0;
+    const char* end = name.data() + name.size();
+    const auto [stop, error] = std::from_chars(name.data() + kPrefix.size(), end, number);
+    if (error != std::errc{} || stop != end) continue;
+    if (root.kind(name) != hdf5::Kind::kGroup)
+      throw InputError(root.where(name) + " is not a group of datasets");
+    numbered.emplace_back(number, name);
+  }
+  std::sort(numbered.begin(), numbered.end());
+  std::vector<std::string> names;
+  for (auto& [number, name] : numbered) names.push_back(std::move(name));
+  return names;
+}
+
+// The declared space, or what the numbers look like.
+ActionSpace action_space_of(const std::vector<RawEpisode>& episodes, const json& metadata,
+                            const std::string& where) {
+  const std::string declared = text_of(metadata, "action_space");
+  if (!declared.empty()) return action_space_from_json(declared, where + ": action_space");
+  ActionSpace space;
+  bool integers = true;
+  double largest = 0;
+  for (const RawEpisode& episode : episodes) {
+    if (!episode.actions) continue;
+    space.dim = static_cast<int>(episode.actions->cols());
+    integers = integers && episode.actions_are_integers;
+    largest = std::max(largest, episode.actions->maxCoeff());
+  }
+  if (space.dim == 0) return space;
+  if (integers && space.dim == 1) {
+    if (largest >= 65536)
+      throw InputError(where + ": the discrete action " + std::to_string(largest) +
+                       " is too large");
+    space.discrete = true;
+    space.n = static_cast<int>(largest) + 1;
+  } else {
+    space.low.assign(static_cast<std::size_t>(space.dim), -std::numeric_limits<float>::infinity());
+    space.high.assign(static_cast<std::size_t>(space.dim), std::numeric_limits<float>::infinity());
+  }
+  return space;
+}
+
+void check_discrete(const RawEpisode& raw, Eigen::Index t, double action,
+                    const ActionSpace& space) {
+  if (action >= 0 && action < space.n && std::floor(action) == action) return;
+  throw InputError(raw.where + "/actions: step " + std::to_string(t) + " has the action " +
+                   json(action).dump() + "; the actions are the whole numbers from 0 to " +
+                   std::to_string(space.n - 1));
+}
+
+DemoEpisode finish(RawEpisode raw, const ActionSpace& space) {
+  const Eigen::Index steps = raw.steps();
+  if (raw.actions && raw.actions->cols() != space.dim)
+    throw InputError(raw.where + "/actions has " + std::to_string(raw.actions->cols()) +
+                     " entries a step, the action space of the file " + std::to_string(space.dim));
+  DemoEpisode episode = std::move(raw.rest);
+  episode.observations = std::move(raw.observations);
+  const double missing = space.discrete ? 0.0 : std::numeric_limits<double>::quiet_NaN();
+  episode.actions.setConstant(steps, space.dim, missing);
+  episode.available.setZero(steps, space.dim);
+  if (!raw.actions) return episode;
+  for (Eigen::Index t = 0; t < steps; ++t) {
+    for (Eigen::Index k = 0; k < space.dim; ++k) {
+      const double action = (*raw.actions)(t, k);
+      const bool known =
+          !std::isnan(action) &&
+          (!raw.available || (*raw.available)(t, raw.available->cols() == 1 ? 0 : k) == 1);
+      if (!known) continue;
+      if (space.discrete) check_discrete(raw, t, action, space);
+      episode.actions(t, k) = action;
+      episode.available(t, k) = 1;
+    }
+  }
+  return episode;
+}
+
+Demonstrations read(const hdf5::Group& root, const json& metadata, const std::string& where) {
+  const std::vector<std::string> names = episode_names(root);
+  if (names.empty())
+    throw InputError(root.where() + " holds no episodes (groups episode_0, episode_1, ...)");
+  if (metadata.contains("total_episodes") && metadata["total_episodes"] != names.size())
+    throw InputError(where + " says there are " + metadata["total_episodes"].dump() +
+                     " episodes, the file holds " + std::to_string(names.size()) +
+                     "; it is incomplete, copy or record it again");
+
+  Demonstrations demonstrations;
+  demonstrations.environment = environment_of(metadata, where);
+  demonstrations.pattern = text_of(metadata, kPatternKey);
+  demonstrations.observations_are_float32 = true;
+  std::vector<RawEpisode> episodes;
+  bool any_actions = false;
+  bool float32 = true;
+  for (const std::string& name : names) {
+    episodes.push_back(read_episode(root.group(name)));
+    const RawEpisode& episode = episodes.back();
+    if (episode.observations.cols() != episodes.front().observations.cols())
+      throw InputError(
+          episode.where + "/observations has " + std::to_string(episode.observations.cols()) +
+          " entries a step, those before " + std::to_string(episodes.front().observations.cols()));
+    demonstrations.observations_are_float32 &= episode.observations_are_float32;
+    any_actions = any_actions || episode.actions;
+    float32 = float32 &&
+              (!episode.actions || episode.actions_are_float32 || episode.actions_are_integers);
+  }
+  demonstrations.observation_dim = static_cast<int>(episodes.front().observations.cols());
+  demonstrations.action = action_space_of(episodes, metadata, where);
+  demonstrations.actions_are_float32 = !any_actions || float32;
+  for (RawEpisode& episode : episodes)
+    demonstrations.episodes.push_back(finish(std::move(episode), demonstrations.action));
+  if (!metadata.empty())
+    demonstrations.metadata = metadata.dump(-1, ' ', false, json::error_handler_t::replace);
+  return demonstrations;
+}
+
+}  // namespace
+
+Demonstrations read_demonstrations(const std::string& path_or_id) {
+  const DatasetLocation location = locate_dataset(path_or_id);
+  json metadata;
+  if (!location.metadata.empty()) {
+    const std::vector<std::uint8_t> bytes = read_file(location.metadata, std::size_t{64} << 20);
+    metadata = parse_python_json(std::string(bytes.begin(), bytes.end()), location.metadata);
+    if (!metadata.is_object())
+      throw InputError(location.metadata + " is not a JSON object, so no metadata of Minari's");
+  }
+  hdf5::File file = hdf5::File::open(location.data);
+  if (location.metadata.empty()) metadata = root_metadata(file.root());
+  return read(file.root(), metadata, location.metadata.empty() ? location.data : location.metadata);
+}
+
+Demonstrations read_demonstrations(std::span<const std::uint8_t> bytes, const std::string& name) {
+  hdf5::File file = hdf5::File::from_image(bytes, name);
+  const json metadata = root_metadata(file.root());
+  return read(file.root(), metadata, name);
+}
+
+}  // namespace agail

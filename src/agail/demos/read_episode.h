@@ -1,0 +1,29 @@
+// One episode_<i> group of a Minari file, read as it stands; what it means is decided with the
+// whole file known.
+#pragma once
+
+#include <optional>
+
+#include "agail/demos/demonstrations.h"
+#include "agail/demos/hdf5.h"
+
+namespace agail {
+
+struct RawEpisode {
+  std::string where;               // for messages
+  RowMatrix<double> observations;  // (T+1) x observation_dim, finite
+  std::optional<RowMatrix<double>>
+      actions;  // T x action_dim, NaN or finite; absent: the file has none
+  std::optional<RowMatrix<double>> available;  // T x 1 or T x action_dim, 0 or 1; absent: no mask
+  DemoEpisode rest;                            // rewards, terminations, truncations, seed
+  bool observations_are_float32 = false;
+  bool actions_are_float32 = false;
+  bool actions_are_integers = false;
+
+  Eigen::Index steps() const { return observations.rows() - 1; }
+};
+
+// Throws InputError (what, where, how to mend it) for whatever does not fit Minari's layout.
+RawEpisode read_episode(const hdf5::Group& group);
+
+}  // namespace agail

@@ -1,0 +1,24 @@
+// Spaces as Minari writes them into its metadata.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "agail/base/spaces.h"
+
+namespace agail {
+
+// Python's json writes and reads Infinity, -Infinity and NaN, which JSON does not have. Here they
+// become the strings of that name. Throws InputError, starting with `where`, if it is not JSON
+// either way.
+nlohmann::json parse_python_json(const std::string& text, const std::string& where);
+
+// {"type": "Box", ...} or {"type": "Discrete", ...}.
+std::string action_space_to_json(const ActionSpace& space, bool is_float32);
+std::string observation_space_to_json(int dim, bool is_float32);
+
+// Throws InputError, starting with `where`, for any other kind of space, and for bounds that do not
+// fit the shape.
+ActionSpace action_space_from_json(const std::string& text, const std::string& where);
+
+}  // namespace agail
