@@ -6,6 +6,11 @@
 
 namespace agail {
 
+// Thrown when a signal ended the work after everything was saved. Exit code 128 + signal.
+struct Interrupted {
+  int signal;
+};
+
 void add_envs(CLI::App& app);
 void add_train(CLI::App& app);
 void add_record(CLI::App& app);

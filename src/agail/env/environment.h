@@ -66,6 +66,9 @@ std::vector<std::string> environment_ids();
 // Throws InputError, naming the nearest id, if `id` is unknown. Models are compiled once a process and shared.
 std::unique_ptr<Environment> make_environment(const std::string& id);
 
+// Version of the physics library, e.g. "4.0.0".
+std::string physics_version();
+
 // The spec without building an environment.
 EnvironmentSpec environment_spec(const std::string& id);
 

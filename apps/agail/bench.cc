@@ -1,0 +1,157 @@
+// agail bench: what training costs over pure stepping.
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "agail/base/crc32c.h"
+#include "agail/config/resolve.h"
+#include "agail/demos/mask.h"
+#include "agail/train/evaluation.h"
+#include "agail/train/trainer.h"
+#include "commands.h"
+
+namespace agail {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using nlohmann::ordered_json;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+struct Options {
+  std::vector<std::string> environments;
+  std::string method = "agail", preset = "paper";
+  std::vector<std::string> assignments;
+  double missing = 0.5;
+  int updates = 60, threads = 1;
+  bool json = false;
+};
+
+TrainingTask make_task(const Options& options, const std::string& environment) {
+  TrainingTask task;
+  task.environment = environment;
+  task.method = options.method;
+  task.settings = resolve_settings({options.preset, environment, options.assignments});
+  task.settings_toml = to_toml(task.settings);
+  task.threads = options.threads;
+  if (options.method == "trpo") return task;
+  // Demonstrations of an untrained policy: what they show does not matter to what learning from
+  // them costs.
+  TrainingTask plain = task;
+  plain.method = "trpo";
+  Trainer untrained(std::move(plain));
+  ThreadPool pool(1);
+  Demonstrations demos = record(untrained.policy(), 100, 0, true, pool);
+  remove_actions(
+      demos, {.pattern = MaskPattern::kStep, .ratio = options.missing, .seed = 0, .dimension = {}});
+  task.demonstrations = std::move(demos);
+  return task;
+}
+
+// Alternates: an update of training, then the same actions replayed by a second collector from the
+// same state.
+ordered_json measure(const Options& options, const std::string& environment) {
+  Trainer trainer(make_task(options, environment));
+  ThreadPool replay_pool(options.threads);
+  Collector replayed(environment, trainer.task().settings.run.lanes, trainer.task().seed,
+                     replay_pool);
+  constexpr int kWarmUp = 3;
+  double training = 0, stepping = 0;
+  std::array<double, static_cast<std::size_t>(Phase::kCount)> before{};
+  for (int i = 0; i < kWarmUp + options.updates; ++i) {
+    if (i == kWarmUp) {
+      training = stepping = 0;
+      for (std::size_t p = 0; p < before.size(); ++p)
+        before[p] = trainer.stopwatch().seconds(static_cast<Phase>(p));
+    }
+    TensorStore state;
+    Archive saving(state, Archive::Mode::kSave);
+    trainer.collector().archive(saving);
+    Archive loading(state, Archive::Mode::kLoad);
+    replayed.archive(loading);
+
+    Clock::time_point start = Clock::now();
+    trainer.update();
+    training += seconds_since(start);
+    start = Clock::now();
+    replayed.replay(trainer.batch());
+    stepping += seconds_since(start);
+  }
+  const double samples =
+      static_cast<double>(options.updates) * static_cast<double>(trainer.batch().size());
+  const auto microseconds = [&](double seconds) { return 1e6 * seconds / samples; };
+  ordered_json split;
+  // Time between updates (copying the state) is no part of training: the rest is what the phases
+  // leave of it.
+  double named = 0;
+  for (std::size_t p = 0; p + 1 < before.size(); ++p) {
+    const double spent = trainer.stopwatch().seconds(static_cast<Phase>(p)) - before[p];
+    named += spent;
+    split[kPhaseNames[p]] = microseconds(spent);
+  }
+  split["rest"] = microseconds(training - named);
+  const std::vector<std::uint8_t> bytes = [&] {
+    const Vector<float>& theta = trainer.policy().theta();
+    const auto* data = reinterpret_cast<const std::uint8_t*>(theta.data());
+    return std::vector<std::uint8_t>(data,
+                                     data + static_cast<std::size_t>(theta.size()) * sizeof(float));
+  }();
+  char signature[16];
+  std::snprintf(signature, sizeof signature, "%08x", crc32c(bytes));
+  return {{"environment", environment},
+          {"method", options.method},
+          {"preset", options.preset},
+          {"samples", samples},
+          {"threads", options.threads},
+          {"stepping_us", microseconds(stepping)},
+          {"training_us", microseconds(training)},
+          {"ratio", training / stepping},
+          {"split_us", split},
+          {"signature", signature}};
+}
+
+void run(Options options) {
+  if (options.environments.empty())
+    options.environments = {"Hopper-v5", "Walker2d-v5", "Humanoid-v4"};
+  ordered_json results = ordered_json::array();
+  for (const std::string& environment : options.environments) {
+    results.push_back(measure(options, environment));
+    if (options.json) continue;
+    const ordered_json& result = results.back();
+    std::printf(
+        "%s, %s, preset %s: stepping %.2f us, training %.2f us a sample, ratio %.3f, signature "
+        "%s\n",
+        environment.c_str(), options.method.c_str(), options.preset.c_str(),
+        result["stepping_us"].get<double>(), result["training_us"].get<double>(),
+        result["ratio"].get<double>(), result["signature"].get<std::string>().c_str());
+    for (const auto& [name, value] : result["split_us"].items())
+      std::printf("  %-20s %8.3f us\n", name.c_str(), value.get<double>());
+    std::fflush(stdout);
+  }
+  if (options.json) std::cout << results.dump(2) << "\n";
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app) {
+  CLI::App* command =
+      app.add_subcommand("bench", "Measure training against pure stepping of the physics");
+  const auto options = std::make_shared<Options>();
+  command->add_option("ENV", options->environments, "Default: Hopper-v5 Walker2d-v5 Humanoid-v4");
+  command->add_option("--method", options->method, "Default agail");
+  command->add_option("--preset", options->preset, "Default paper");
+  command->add_option("--set", options->assignments, "key=value, for any setting")
+      ->allow_extra_args(false);
+  command->add_option("--missing", options->missing, "Share of missing actions, default 0.5");
+  command->add_option("--updates", options->updates, "Updates to measure, default 60")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--threads", options->threads, "Default 1")->check(CLI::Range(1, 4096));
+  command->add_flag("--json", options->json, "Print JSON");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace agail

@@ -1,0 +1,108 @@
+// agail train: a policy from an environment's reward, or from demonstrations.
+#include <iostream>
+#include <memory>
+
+#include "agail/base/nearest.h"
+#include "agail/base/thread_pool.h"
+#include "agail/config/resolve.h"
+#include "agail/config/settings_reference.h"
+#include "agail/demos/minari_reader.h"
+#include "agail/train/run.h"
+#include "commands.h"
+
+namespace agail {
+namespace {
+
+const std::vector<std::string> kMethods = {"trpo", "gail", "state-gail", "agail", "bc"};
+
+struct Options {
+  std::string environment, method, out, demos;
+  std::string preset = "default";
+  std::vector<std::string> assignments;
+  std::int64_t timesteps = 0, lanes = 0;
+  std::uint64_t seed = 0;
+  int threads = 0;
+  bool resume = false;
+};
+
+// With --resume and no settings of its own, a run goes on with those that it was started with.
+SettingsSource source_of(const Options& options, bool preset_given) {
+  SettingsSource source{options.preset, options.environment, options.assignments};
+  const std::filesystem::path config = std::filesystem::path(options.out) / "config.toml";
+  if (options.resume && !preset_given && options.assignments.empty() &&
+      std::filesystem::exists(config))
+    source.preset = config.string();
+  if (options.timesteps > 0)
+    source.assignments.push_back("run.timesteps=" + std::to_string(options.timesteps));
+  if (options.lanes > 0) source.assignments.push_back("run.lanes=" + std::to_string(options.lanes));
+  return source;
+}
+
+void run(const Options& options, bool preset_given) {
+  if (std::find(kMethods.begin(), kMethods.end(), options.method) == kMethods.end())
+    throw InputError("--method " + options.method + ": no such method; did you mean '" +
+                     nearest(options.method, kMethods) + "'? (trpo gail state-gail agail bc)");
+  environment_spec(options.environment);  // an unknown id is told before anything else
+  TrainingTask task;
+  task.environment = options.environment;
+  task.method = options.method;
+  task.settings = resolve_settings(source_of(options, preset_given));
+  task.settings_toml = to_toml(task.settings);
+  task.seed = options.seed;
+  task.threads = options.threads > 0 ? options.threads : default_threads();
+  if (!options.demos.empty()) task.demonstrations = read_demonstrations(options.demos);
+  if (task.demonstrations && !task.demonstrations->environment.empty() &&
+      task.demonstrations->environment != options.environment)
+    std::cerr << "agail: note: the demonstrations are of " << task.demonstrations->environment
+              << ", training is on " << options.environment << "\n";
+
+  const RunOutcome outcome = run_training(std::move(task), options.out, options.resume);
+  if (outcome.signal != 0) {
+    std::cerr << "agail: stopped at " << outcome.timesteps << " steps; go on with --resume\n";
+    throw Interrupted{outcome.signal};
+  }
+  const std::optional<Evaluation>& shown = outcome.best ? outcome.best : outcome.last;
+  std::cout << options.out;
+  if (shown)
+    std::cout << ": mean return " << shown->mean_return() << " over " << shown->returns.size()
+              << " deterministic episodes" << (outcome.best ? " (best checkpoint)" : "");
+  std::cout << "\n";
+}
+
+}  // namespace
+
+void add_train(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("train", "Train a policy");
+  const auto options = std::make_shared<Options>();
+  command->add_option("ENV", options->environment, "Environment id, see agail envs")->required();
+  command->add_option("--method", options->method, "trpo gail state-gail agail bc")->required();
+  command->add_option("--out", options->out, "Run folder to create")->required();
+  command->add_option(
+      "--demos", options->demos,
+      "Demonstrations: a .hdf5 file, a Minari dataset folder or a Minari dataset id");
+  CLI::Option* preset =
+      command->add_option("--preset", options->preset, "default, paper, or a .toml file");
+  command->add_option("--set", options->assignments, "key=value, for any setting (may be repeated)")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--timesteps", options->timesteps,
+                   "Stop after the first update at or past this many steps")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--seed", options->seed, "Names all random numbers");
+  command
+      ->add_option("--threads", options->threads, "Default: the cores of this machine or container")
+      ->check(CLI::Range(1, 4096));
+  command->add_option("--lanes", options->lanes, "Environments that collect a batch side by side")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--resume", options->resume, "Go on with the run in --out");
+  command->add_flag_callback(
+      "--help-settings",
+      [] {
+        std::cout << settings_help();
+        throw CLI::Success();
+      },
+      "Print every setting and exit");
+  command->callback([options, preset] { run(*options, preset->count() > 0); });
+}
+
+}  // namespace agail

@@ -1,0 +1,49 @@
+// Where a training run spends its time: one phase at a time, switched by the code that starts it.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+
+namespace agail {
+
+enum class Phase : std::size_t {
+  kPhysics,
+  kInference,
+  kPolicyGradient,
+  kConjugateGradient,
+  kLineSearch,
+  kValue,
+  kDiscriminator,
+  kGuide,
+  kRest,
+  kCount
+};
+
+inline constexpr std::array<const char*, static_cast<std::size_t>(Phase::kCount)> kPhaseNames = {
+    "physics",       "inference", "policy_gradient", "conjugate_gradient", "line_search", "value",
+    "discriminator", "guide",     "rest"};
+
+class Stopwatch {
+ public:
+  void start(Phase phase) {
+    const Clock::time_point now = Clock::now();
+    seconds_[static_cast<std::size_t>(phase_)] += std::chrono::duration<double>(now - since_).count();
+    since_ = now;
+    phase_ = phase;
+  }
+  // Time measured elsewhere (by several threads, divided by their number) that the current phase must not count.
+  void move_to(Phase phase, double seconds) {
+    seconds_[static_cast<std::size_t>(phase)] += seconds;
+    seconds_[static_cast<std::size_t>(phase_)] -= seconds;
+  }
+  double seconds(Phase phase) const { return seconds_[static_cast<std::size_t>(phase)]; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::array<double, static_cast<std::size_t>(Phase::kCount)> seconds_{};
+  Clock::time_point since_ = Clock::now();
+  Phase phase_ = Phase::kRest;
+};
+
+}  // namespace agail

@@ -1,0 +1,41 @@
+#include "agail/imitation/demo_data.h"
+
+#include <algorithm>
+
+namespace agail {
+
+DemoData::DemoData(const Demonstrations& demos) {
+  const Index n = demos.transitions();
+  const Index dim = demos.action.dim;
+  states.resize(demos.observation_dim, n);
+  next_states.resize(demos.observation_dim, n);
+  actions.setZero(dim, n);
+  available.setZero(dim, n);
+  Index column = 0;
+  for (const DemoEpisode& episode : demos.episodes) {
+    for (Index t = 0; t < episode.steps(); ++t, ++column) {
+      states.col(column) = episode.observations.row(t).transpose().cast<float>();
+      next_states.col(column) = episode.observations.row(t + 1).transpose().cast<float>();
+      Index known = 0;
+      for (Index i = 0; i < dim; ++i) {
+        if (episode.available(t, i) == 0) continue;  // what stands in a missing entry is never read
+        actions(i, column) = static_cast<float>(episode.actions(t, i));
+        available(i, column) = 1;
+        ++known;
+      }
+      if (known > 0) some_action.push_back(column);
+      if (known == dim && dim > 0) full_action.push_back(column);
+    }
+  }
+}
+
+void encode_action(const ActionSpace& space, const float* action, float* encoded) {
+  if (!space.discrete) {
+    std::copy_n(action, space.dim, encoded);
+    return;
+  }
+  std::fill_n(encoded, space.n, 0.0F);
+  encoded[static_cast<Index>(action[0])] = 1;
+}
+
+}  // namespace agail

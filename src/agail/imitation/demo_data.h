@@ -1,0 +1,31 @@
+// Demonstrations as learners take them: one transition a column, in the order of the file.
+#pragma once
+
+#include <vector>
+
+#include "agail/base/spaces.h"
+#include "agail/demos/demonstrations.h"
+#include "agail/nn/matrix.h"
+
+namespace agail {
+
+struct DemoData {
+  explicit DemoData(const Demonstrations& demos);
+
+  Index size() const { return states.cols(); }
+  Index action_dim() const { return actions.rows(); }
+
+  Matrix<float> states;       // observation_dim x n, s_t
+  Matrix<float> next_states;  // observation_dim x n, s_{t+1}
+  Matrix<float> actions;      // action_dim x n (discrete: the index); 0 where missing, whatever the
+                              // file holds there
+  Matrix<float> available;    // action_dim x n, 1 where known
+  std::vector<Index> some_action;  // columns with any known entry
+  std::vector<Index> full_action;  // columns with all entries known
+};
+
+// Encodes actions for a network: one-hot if discrete, else as they are. `encoded`:
+// space.encoded_dim() numbers.
+void encode_action(const ActionSpace& space, const float* action, float* encoded);
+
+}  // namespace agail

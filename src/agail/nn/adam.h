@@ -1,0 +1,52 @@
+// Adam (Kingma & Ba, 2015, algorithm 1 with the bias correction folded into the step size, their
+// section 2).
+#pragma once
+
+#include <cmath>
+
+#include "agail/base/archive.h"
+#include "agail/nn/matrix.h"
+
+namespace agail {
+
+template <class S>
+class Adam {
+ public:
+  explicit Adam(Index parameters)
+      : first_(Vector<S>::Zero(parameters)), second_(Vector<S>::Zero(parameters)) {}
+
+  // theta -= learning rate * m^ / (sqrt(v^) + epsilon)
+  void descend(Eigen::Ref<Vector<S>> theta, const Eigen::Ref<const Vector<S>>& gradient,
+               double learning_rate) {
+    ++step_;
+    const double correction1 = 1 - std::pow(kBeta1, static_cast<double>(step_));
+    const double correction2 = std::sqrt(1 - std::pow(kBeta2, static_cast<double>(step_)));
+    const auto rate = static_cast<S>(learning_rate * correction2 / correction1);
+    const auto epsilon = static_cast<S>(kEpsilon * correction2);
+    constexpr auto b1 = static_cast<S>(kBeta1);
+    constexpr auto b2 = static_cast<S>(kBeta2);
+    constexpr Index kBlock = 1024;  // one pass over memory
+    for (Index i = 0; i < theta.size(); i += kBlock) {
+      const Index n = std::min(kBlock, theta.size() - i);
+      auto m = first_.segment(i, n).array();
+      auto v = second_.segment(i, n).array();
+      const auto g = gradient.segment(i, n).array();
+      m = b1 * m + (S(1) - b1) * g;
+      v = b2 * v + (S(1) - b2) * g.square();
+      theta.segment(i, n).array() -= rate * m / (v.sqrt() + epsilon);
+    }
+  }
+
+  void archive(Archive& a) requires std::same_as<S, float> {
+    a("first_moment", std::span<float>(first_.data(), static_cast<std::size_t>(first_.size())));
+    a("second_moment", std::span<float>(second_.data(), static_cast<std::size_t>(second_.size())));
+    a("step", step_);
+  }
+
+ private:
+  static constexpr double kBeta1 = 0.9, kBeta2 = 0.999, kEpsilon = 1e-8;
+  Vector<S> first_, second_;
+  std::int64_t step_ = 0;
+};
+
+}  // namespace agail

@@ -1,0 +1,149 @@
+#include "agail/rl/rollout.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace agail {
+
+Batch::Batch(int observation_dim, int action_dim, Index lane_count, Index steps_a_lane)
+    : lanes(lane_count),
+      steps(steps_a_lane),
+      observations(Matrix<float>::Zero(observation_dim, size())),
+      inputs(Matrix<float>::Zero(padded(observation_dim + 1), size())),
+      actions(Matrix<float>::Zero(action_dim, size())),
+      rewards(Vector<float>::Zero(size())),
+      endings(static_cast<std::size_t>(size())),
+      final_observations(Matrix<float>::Zero(observation_dim, size())) {
+  finished.reserve(static_cast<std::size_t>(size()));
+}
+
+void clip_action(const ActionSpace& space, const float* sampled, float* executed) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(space.dim); ++i)
+    executed[i] = space.discrete ? sampled[i] : std::clamp(sampled[i], space.low[i], space.high[i]);
+}
+
+Collector::Collector(const std::string& environment, Index lanes, std::uint64_t seed,
+                     ThreadPool& pool)
+    : seed_(seed), pool_(pool), lanes_(static_cast<std::size_t>(lanes)) {
+  for (Lane& lane : lanes_) {
+    lane.environment = make_environment(environment);
+    lane.finished.reserve(4096);
+  }
+}
+
+void Collector::start_episode(Index index) {
+  Lane& lane = lanes_[static_cast<std::size_t>(index)];
+  ++lane.episode;
+  lane.episode_return = 0;
+  RandomStream random(seed_, Purpose::kReset, static_cast<std::uint32_t>(index),
+                      static_cast<std::uint32_t>(lane.episode));
+  lane.environment->reset(random);
+}
+
+void Collector::collect_lane(Index index, const PolicyNetwork<float>& network,
+                             const Vector<float>& theta, const Normalizer& normalizer, Batch& batch,
+                             Worker& worker) {
+  using Clock = std::chrono::steady_clock;
+  Lane& lane = lanes_[static_cast<std::size_t>(index)];
+  Environment& environment = *lane.environment;
+  const ActionSpace& space = environment.spec().action;
+  lane.finished.clear();
+  lane.diverged = 0;
+  double physics = 0;
+  const Clock::time_point begin = Clock::now();
+  if (lane.episode < 0) start_episode(index);
+
+  const auto store = [&](Matrix<float>& matrix, Index column) {
+    const std::span<const double> observation = environment.observation();
+    float* to = matrix.col(column).data();
+    for (std::size_t i = 0; i < observation.size(); ++i) to[i] = static_cast<float>(observation[i]);
+  };
+
+  for (Index t = 0; t < batch.steps; ++t) {
+    const Index j = index * batch.steps + t;
+    store(batch.observations, j);
+    normalizer.apply(batch.observations.col(j).data(), batch.inputs.col(j).data());
+    network.mlp.forward(theta.data(), batch.inputs.block(0, j, network.mlp.inputs() + 1, 1),
+                        worker.tape, 0);
+    RandomStream random(seed_, Purpose::kAct, static_cast<std::uint32_t>(index),
+                        static_cast<std::uint32_t>(lane.episode),
+                        static_cast<std::uint32_t>(environment.elapsed_steps()));
+    float* action = batch.actions.col(j).data();
+    network.distribution.sample(worker.tape.outputs.back().data(), network.log_std(theta.data()),
+                                random, action);
+    clip_action(space, action, worker.executed.data());
+
+    const Clock::time_point before = Clock::now();
+    const StepResult result = environment.step(worker.executed);
+    lane.episode_return += result.reward;
+    batch.rewards[j] = static_cast<float>(result.reward);
+    batch.endings[static_cast<std::size_t>(j)] = result.terminated  ? Ending::kTerminated
+                                                 : result.truncated ? Ending::kTruncated
+                                                                    : Ending::kNone;
+    if (result.diverged) ++lane.diverged;
+    const bool done = result.terminated || result.truncated;
+    if (done || batch.lane_ends(j)) store(batch.final_observations, j);
+    if (done) {
+      lane.finished.push_back(
+          {lane.episode_return, static_cast<double>(environment.elapsed_steps())});
+      start_episode(index);
+    }
+    physics += std::chrono::duration<double>(Clock::now() - before).count();
+  }
+  lane.physics_seconds = physics;
+  lane.inference_seconds = std::chrono::duration<double>(Clock::now() - begin).count() - physics;
+}
+
+void Collector::collect(const PolicyNetwork<float>& network, const Vector<float>& theta,
+                        const Normalizer& normalizer, Batch& batch, Stopwatch& stopwatch) {
+  while (workers_.size() < static_cast<std::size_t>(pool_.threads()))
+    workers_.push_back({network.mlp.make_tape(1),
+                        std::vector<float>(static_cast<std::size_t>(spec().action.dim))});
+  pool_.run(static_cast<int>(lanes_.size()), [&](int lane, int worker) {
+    collect_lane(lane, network, theta, normalizer, batch,
+                 workers_[static_cast<std::size_t>(worker)]);
+  });
+  batch.finished.clear();
+  batch.diverged = 0;
+  double physics = 0, inference = 0;
+  for (const Lane& lane : lanes_) {
+    batch.finished.insert(batch.finished.end(), lane.finished.begin(), lane.finished.end());
+    batch.diverged += lane.diverged;
+    physics += lane.physics_seconds;
+    inference += lane.inference_seconds;
+  }
+  const auto threads = static_cast<double>(
+      std::min<std::size_t>(lanes_.size(), static_cast<std::size_t>(pool_.threads())));
+  stopwatch.move_to(Phase::kPhysics, physics / threads);
+  stopwatch.move_to(Phase::kInference, inference / threads);
+}
+
+void Collector::replay(const Batch& batch) {
+  pool_.run(static_cast<int>(lanes_.size()), [&](int index, int) {
+    Lane& lane = lanes_[static_cast<std::size_t>(index)];
+    std::vector<float> executed(static_cast<std::size_t>(spec().action.dim));
+    if (lane.episode < 0) start_episode(index);
+    for (Index t = 0; t < batch.steps; ++t) {
+      clip_action(spec().action, batch.actions.col(index * batch.steps + t).data(), executed.data());
+      const StepResult result = lane.environment->step(executed);
+      lane.episode_return += result.reward;
+      if (result.terminated || result.truncated) start_episode(index);
+    }
+  });
+}
+
+void Collector::archive(Archive& a) {
+  for (std::size_t i = 0; i < lanes_.size(); ++i) {
+    Lane& lane = lanes_[i];
+    a.scope(std::to_string(i), [&](Archive& inner) {
+      std::vector<double> state;
+      if (!inner.loading() && lane.episode >= 0) state = lane.environment->save();
+      inner.resizable("environment", state);
+      inner("episode", lane.episode);
+      inner("episode_return", lane.episode_return);
+      if (inner.loading() && lane.episode >= 0) lane.environment->restore(state);
+    });
+  }
+}
+
+}  // namespace agail

@@ -1,0 +1,88 @@
+// Collecting batches: lanes step their own environments with the current policy.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "agail/base/archive.h"
+#include "agail/base/stopwatch.h"
+#include "agail/env/environment.h"
+#include "agail/nn/normalizer.h"
+#include "agail/rl/policy_network.h"
+
+namespace agail {
+
+enum class Ending : std::uint8_t { kNone, kTerminated, kTruncated };
+
+struct FinishedEpisode {
+  double episode_return = 0;  // undiscounted, of the environment's own reward
+  double length = 0;
+};
+
+// lanes x steps samples, one a column; lane l owns columns [l * steps, (l + 1) * steps) in the
+// order of time.
+struct Batch {
+  Batch(int observation_dim, int action_dim, Index lane_count, Index steps_a_lane);
+
+  Index lanes = 0, steps = 0;
+  Index size() const { return lanes * steps; }
+  bool lane_ends(Index column) const { return (column + 1) % steps == 0; }
+
+  Matrix<float> observations;  // observation_dim x n
+  Matrix<float>
+      inputs;  // the same, normalised, with a row of ones: what policy and value networks see
+  Matrix<float> actions;             // action_dim x n, as sampled (not clipped)
+  Vector<float> rewards;             // n, the environment's
+  std::vector<Ending> endings;       // n
+  Matrix<float> final_observations;  // the state after a column that truncates or ends its lane;
+                                     // others: undefined
+  std::vector<FinishedEpisode> finished;
+  std::int64_t diverged = 0;  // episodes that ended because the simulation broke down
+};
+
+// What the environment executes: the action within its bounds.
+void clip_action(const ActionSpace& space, const float* sampled, float* executed);
+
+class Collector {
+ public:
+  Collector(const std::string& environment, Index lanes, std::uint64_t seed, ThreadPool& pool);
+
+  const EnvironmentSpec& spec() const { return lanes_.front().environment->spec(); }
+
+  // Fills the batch, each lane on one thread. The policy and the normaliser do not change
+  // meanwhile.
+  void collect(const PolicyNetwork<float>& network, const Vector<float>& theta,
+               const Normalizer& normalizer, Batch& batch, Stopwatch& stopwatch);
+
+  // Steps through the actions of a batch again, from the state that this collector is in: the same physics without
+  // any learning or network, which is what training is measured against.
+  void replay(const Batch& batch);
+
+  // Everything that the next batch depends on, the environments' state included.
+  void archive(Archive& a);
+
+ private:
+  struct Lane {
+    std::unique_ptr<Environment> environment;
+    std::int64_t episode = -1;  // number of the episode under way; -1: none yet
+    double episode_return = 0;
+    std::vector<FinishedEpisode> finished;  // in the batch under way
+    std::int64_t diverged = 0;
+    double physics_seconds = 0, inference_seconds = 0;
+  };
+  struct Worker {
+    Tape<float> tape;
+    std::vector<float> executed;
+  };
+  void collect_lane(Index lane, const PolicyNetwork<float>& network, const Vector<float>& theta,
+                    const Normalizer& normalizer, Batch& batch, Worker& worker);
+  void start_episode(Index lane);
+
+  std::uint64_t seed_;
+  ThreadPool& pool_;
+  std::vector<Lane> lanes_;
+  std::vector<Worker> workers_;
+};
+
+}  // namespace agail

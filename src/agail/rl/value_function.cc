@@ -1,0 +1,98 @@
+#include "agail/rl/value_function.h"
+
+#include <cmath>
+#include <numeric>
+
+#include "agail/base/random.h"
+
+namespace agail {
+
+ValueFunction::ValueFunction(int observation_dim, const ValueSettings& settings, ThreadPool& pool,
+                             Index capacity, std::uint64_t seed)
+    : settings_(settings),
+      pool_(pool),
+      seed_(seed),
+      mlp_(layer_sizes(observation_dim, settings.hidden, 1), Activation::kTanh),
+      theta_(Vector<float>::Zero(mlp_.parameters())),
+      adam_(mlp_.parameters()),
+      tape_(mlp_.make_tape(std::max<Index>(capacity, settings.minibatch))),
+      sums_(mlp_.parameters(), settings.minibatch),
+      minibatch_x_(Matrix<float>::Zero(padded(mlp_.inputs() + 1), settings.minibatch)),
+      minibatch_target_(RowVector<float>::Zero(settings.minibatch)) {
+  RandomStream random(seed, Purpose::kInitialise, 1);
+  mlp_.initialise(theta_.data(), random, 0.1);
+  order_.reserve(static_cast<std::size_t>(capacity));
+  for (int i = 0; i < pool.threads(); ++i)
+    workers_.push_back({mlp_.make_scratch(), Matrix<float>::Zero(1, kChunk)});
+}
+
+void ValueFunction::predict(const Matrix<float>& x, Index n, Vector<float>& values) {
+  for_each_chunk(pool_, n, [&](int, Index first, Index count) {
+    mlp_.forward(theta_.data(), x.block(0, first, mlp_.inputs() + 1, count), tape_, first);
+    values.segment(first, count) =
+        (mlp_.output(tape_, first, count).row(0).array() * static_cast<float>(std_) +
+         static_cast<float>(mean_))
+            .transpose();
+  });
+}
+
+void ValueFunction::follow(const Vector<float>& targets, Index n) {
+  const Vector<float>::ConstSegmentReturnType batch = targets.head(n);
+  const double batch_mean = batch.cast<double>().sum() / static_cast<double>(n);
+  const double batch_square = batch.cast<double>().squaredNorm() / static_cast<double>(n);
+  // An average that starts as the plain mean and forgets with a horizon of 20 batches.
+  count_ = std::min(count_ + 1, 20.0);
+  const double old_mean = mean_;
+  const double old_std = std_;
+  mean_ += (batch_mean - mean_) / count_;
+  second_moment_ += (batch_square - second_moment_) / count_;
+  std_ = std::sqrt(std::max(second_moment_ - mean_ * mean_, 1e-4));
+  const Index last = mlp_.offset(mlp_.layers() - 1);
+  const Index weights = mlp_.parameters() - last - 1;
+  theta_.segment(last, weights) *= static_cast<float>(old_std / std_);
+  float& bias = theta_[mlp_.parameters() - 1];
+  bias = static_cast<float>((old_std * static_cast<double>(bias) + old_mean - mean_) / std_);
+}
+
+void ValueFunction::fit(const Matrix<float>& x, const Vector<float>& targets, Index n,
+                        std::uint32_t update) {
+  if (settings_.normalize_targets) follow(targets, n);
+  order_.resize(static_cast<std::size_t>(n));
+  const Index rows = mlp_.inputs() + 1;
+  for (int epoch = 0; epoch < settings_.epochs; ++epoch) {
+    std::iota(order_.begin(), order_.end(), Index{0});
+    RandomStream random(seed_, Purpose::kShuffle, 1, update, static_cast<std::uint32_t>(epoch));
+    shuffle(order_, random);
+    for (Index start = 0; start < n; start += settings_.minibatch) {
+      const Index size = std::min<Index>(settings_.minibatch, n - start);
+      for (Index j = 0; j < size; ++j) {
+        const Index from = order_[static_cast<std::size_t>(start + j)];
+        minibatch_x_.col(j).head(rows) = x.col(from).head(rows);
+        minibatch_target_[j] =
+            (targets[from] - static_cast<float>(mean_)) / static_cast<float>(std_);
+      }
+      const auto gradient =
+          sums_.sum(pool_, size, [&](Index, int w, Index first, Index count, float* out) {
+            Worker& worker = workers_[static_cast<std::size_t>(w)];
+            const auto columns = minibatch_x_.block(0, first, rows, count);
+            mlp_.forward(theta_.data(), columns, tape_, first);
+            View<float> adjoint = worker.adjoint.leftCols(count);
+            adjoint = (mlp_.output(tape_, first, count) - minibatch_target_.segment(first, count)) /
+                      static_cast<float>(size);
+            mlp_.backward(theta_.data(), columns, tape_, first, adjoint, out, worker.scratch);
+          });
+      adam_.descend(theta_, gradient, settings_.learning_rate);
+    }
+  }
+}
+
+void ValueFunction::archive(Archive& a) {
+  a("theta", std::span<float>(theta_.data(), static_cast<std::size_t>(theta_.size())));
+  a("mean", mean_);
+  a("std", std_);
+  a("count", count_);
+  a("second_moment", second_moment_);
+  a.scope("adam", [&](Archive& inner) { adam_.archive(inner); });
+}
+
+}  // namespace agail

@@ -1,0 +1,69 @@
+#include "agail/train/checkpoint.h"
+
+#include "agail/base/atomic_file.h"
+#include "agail/base/crc32c.h"
+#include "agail/config/resolve.h"
+#include "agail/demos/minari_writer.h"
+#include "agail/train/safetensors.h"
+
+namespace agail {
+
+namespace {
+
+constexpr const char* kFormat = "agail-checkpoint-1";
+
+std::map<std::string, std::string> identity(const Trainer& trainer) {
+  const TrainingTask& task = trainer.task();
+  // A run may be made longer, and evaluated or saved more or less often, without becoming another.
+  Settings settings = task.settings;
+  settings.run.timesteps = 1;
+  settings.run.checkpoint_every = 1;
+  std::map<std::string, std::string> result = {{"format", kFormat},
+                                               {"environment", task.environment},
+                                               {"method", task.method},
+                                               {"seed", std::to_string(task.seed)},
+                                               {"settings", to_toml(settings)},
+                                               {"demonstrations", "none"}};
+  if (task.demonstrations) {
+    const std::vector<std::uint8_t> bytes = encode_demonstrations(*task.demonstrations);
+    result["demonstrations"] = "crc32c:" + std::to_string(crc32c(bytes));
+  }
+  return result;
+}
+
+void walk(Archive& archive, Trainer& trainer, double& best_return) {
+  archive("best_return", best_return);
+  archive.scope("trainer", [&](Archive& inner) { trainer.archive(inner); });
+}
+
+}  // namespace
+
+std::filesystem::path checkpoint_file(const std::filesystem::path& folder) {
+  return folder / "checkpoints" / "latest.safetensors";
+}
+
+void save_checkpoint(const std::filesystem::path& folder, Trainer& trainer, double& best_return) {
+  TensorStore store;
+  store.metadata = identity(trainer);
+  Archive archive(store, Archive::Mode::kSave);
+  walk(archive, trainer, best_return);
+  write_file_atomically(checkpoint_file(folder), to_safetensors(store));
+}
+
+bool load_checkpoint(const std::filesystem::path& folder, Trainer& trainer, double& best_return) {
+  const std::filesystem::path file = checkpoint_file(folder);
+  if (!std::filesystem::exists(file)) return false;
+  TensorStore store = from_safetensors(read_file(file), file.string(), Checksum::kRequired);
+  for (const auto& [key, value] : identity(trainer)) {
+    const auto found = store.metadata.find(key);
+    if (found == store.metadata.end() || found->second != value)
+      throw InputError(
+          file.string() + ": the checkpoint was made with other " + key +
+          "; resume with what the run was started with, or start a new run in another folder");
+  }
+  Archive archive(store, Archive::Mode::kLoad);
+  walk(archive, trainer, best_return);
+  return true;
+}
+
+}  // namespace agail

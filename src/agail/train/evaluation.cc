@@ -1,0 +1,145 @@
+#include "agail/train/evaluation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace agail {
+
+namespace {
+
+double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) /
+         static_cast<double>(std::max<std::size_t>(values.size(), 1));
+}
+
+// Runs episode `episode` of `policy`; on_step(action, result) after each step, with the environment
+// after it.
+template <class OnReset, class OnStep>
+void run_episode(const SavedPolicy& policy, Environment& environment,
+                 SavedPolicy::Workspace& workspace, std::uint64_t seed, Purpose purpose,
+                 std::uint32_t episode, bool stochastic, OnReset&& on_reset, OnStep&& on_step) {
+  RandomStream reset(seed, purpose, 0, episode);
+  environment.reset(reset);
+  on_reset();
+  std::vector<float> action(static_cast<std::size_t>(policy.action().dim));
+  for (bool done = false; !done;) {
+    RandomStream random(seed, purpose, 1, episode,
+                        static_cast<std::uint32_t>(environment.elapsed_steps()));
+    policy.act(environment.observation(), stochastic ? &random : nullptr, workspace, action.data());
+    const StepResult result = environment.step(action);
+    on_step(action, result);
+    done = result.terminated || result.truncated;
+  }
+}
+
+struct Actor {
+  std::unique_ptr<Environment> environment;
+  SavedPolicy::Workspace workspace;
+};
+
+std::vector<Actor> make_actors(const SavedPolicy& policy, const ThreadPool& pool) {
+  std::vector<Actor> actors;
+  for (int i = 0; i < pool.threads(); ++i) {
+    actors.push_back({make_environment(policy.info().environment), policy.make_workspace()});
+    const EnvironmentSpec& spec = actors.back().environment->spec();
+    if (spec.observation_dim != policy.observation_dim() ||
+        spec.action.dim != policy.action().dim || spec.action.n != policy.action().n)
+      throw InputError("the policy does not fit " + spec.id + ": it takes " +
+                       std::to_string(policy.observation_dim()) +
+                       " observations, the environment gives " +
+                       std::to_string(spec.observation_dim) +
+                       "; evaluate it with the version of agail that trained it");
+  }
+  return actors;
+}
+
+}  // namespace
+
+double Evaluation::mean_return() const { return mean(returns); }
+double Evaluation::mean_length() const { return mean(lengths); }
+
+double Evaluation::standard_error() const {
+  const auto n = static_cast<double>(returns.size());
+  if (n < 2) return 0;
+  double squares = 0;
+  for (const double r : returns) squares += (r - mean_return()) * (r - mean_return());
+  return std::sqrt(squares / (n - 1) / n);
+}
+
+std::pair<double, double> bootstrap_interval(const std::vector<double>& values,
+                                             std::uint64_t seed) {
+  constexpr std::size_t kResamples = 10'000;
+  RandomStream random(seed, Purpose::kBootstrap);
+  std::vector<double> means(kResamples);
+  for (double& m : means) {
+    double sum = 0;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      sum += values[random.below(static_cast<std::uint32_t>(values.size()))];
+    m = sum / static_cast<double>(values.size());
+  }
+  std::sort(means.begin(), means.end());
+  return {means[kResamples * 25 / 1000], means[kResamples * 975 / 1000 - 1]};
+}
+
+Evaluation evaluate(const SavedPolicy& policy, Index episodes, std::uint64_t seed, bool stochastic,
+                    ThreadPool& pool) {
+  std::vector<Actor> actors = make_actors(policy, pool);
+  const auto n = static_cast<std::size_t>(episodes);
+  std::vector<double> returns(n), lengths(n);
+  std::vector<std::uint8_t> diverged(n);
+  pool.run(static_cast<int>(episodes), [&](int episode, int worker) {
+    Actor& actor = actors[static_cast<std::size_t>(worker)];
+    const auto e = static_cast<std::size_t>(episode);
+    run_episode(
+        policy, *actor.environment, actor.workspace, seed, Purpose::kEvaluate,
+        static_cast<std::uint32_t>(episode), stochastic, [] {},
+        [&](const std::vector<float>&, const StepResult& result) {
+          returns[e] += result.reward;
+          lengths[e] += 1;
+          if (result.diverged) diverged[e] = 1;
+        });
+  });
+  Evaluation evaluation{std::move(returns), std::move(lengths), 0};
+  for (const std::uint8_t d : diverged) evaluation.diverged += d;
+  return evaluation;
+}
+
+Demonstrations record(const SavedPolicy& policy, Index episodes, std::uint64_t seed,
+                      bool stochastic, ThreadPool& pool) {
+  std::vector<Actor> actors = make_actors(policy, pool);
+  const EnvironmentSpec& spec = actors.front().environment->spec();
+  Demonstrations demos;
+  demos.environment = spec.id;
+  demos.action = spec.action;
+  demos.observation_dim = spec.observation_dim;
+  demos.observations_are_float32 = spec.observation_is_float32;
+  demos.episodes.resize(static_cast<std::size_t>(episodes));
+  pool.run(static_cast<int>(episodes), [&](int index, int worker) {
+    Actor& actor = actors[static_cast<std::size_t>(worker)];
+    DemoEpisode& episode = demos.episodes[static_cast<std::size_t>(index)];
+    std::vector<double> observations;
+    std::vector<double> actions;
+    const auto observe = [&] {
+      const std::span<const double> o = actor.environment->observation();
+      observations.insert(observations.end(), o.begin(), o.end());
+    };
+    run_episode(policy, *actor.environment, actor.workspace, seed, Purpose::kRecord,
+                static_cast<std::uint32_t>(index), stochastic, observe,
+                [&](const std::vector<float>& action, const StepResult& result) {
+                  observe();
+                  actions.insert(actions.end(), action.begin(), action.end());
+                  episode.rewards.push_back(result.reward);
+                  episode.terminations.push_back(result.terminated ? 1 : 0);
+                  episode.truncations.push_back(result.truncated ? 1 : 0);
+                });
+    const auto steps = static_cast<Index>(episode.rewards.size());
+    episode.observations =
+        Eigen::Map<const RowMatrix<double>>(observations.data(), steps + 1, spec.observation_dim);
+    episode.actions = Eigen::Map<const RowMatrix<double>>(actions.data(), steps, spec.action.dim);
+    episode.available = RowMatrix<std::uint8_t>::Ones(steps, spec.action.dim);
+  });
+  return demos;
+}
+
+}  // namespace agail

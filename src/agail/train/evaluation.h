@@ -1,0 +1,36 @@
+// Episodes of a policy, and what they say.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "agail/base/thread_pool.h"
+#include "agail/demos/demonstrations.h"
+#include "agail/train/saved_policy.h"
+
+namespace agail {
+
+struct Evaluation {
+  std::vector<double> returns;  // undiscounted, one an episode
+  std::vector<double> lengths;
+  std::int64_t diverged = 0;  // episodes that ended because the simulation broke down
+
+  double mean_return() const;
+  double mean_length() const;
+  double standard_error() const;  // sample standard deviation / sqrt(n); 0 for one episode
+};
+
+// 95 % percentile bootstrap interval of the mean (Efron), from 10,000 resamples.
+std::pair<double, double> bootstrap_interval(const std::vector<double>& values, std::uint64_t seed);
+
+// Episode e is the same for any number of threads: reset and actions have streams of their own.
+// Takes the mode of the policy unless `stochastic`. Stops early, with the episodes that are whole,
+// when interrupted() becomes true.
+Evaluation evaluate(const SavedPolicy& policy, Index episodes, std::uint64_t seed, bool stochastic,
+                    ThreadPool& pool);
+
+// The same episodes (under streams of their own) as complete demonstrations.
+Demonstrations record(const SavedPolicy& policy, Index episodes, std::uint64_t seed,
+                      bool stochastic, ThreadPool& pool);
+
+}  // namespace agail

@@ -1,0 +1,47 @@
+// What a run tells while it goes on: progress.csv, TensorBoard events, and a line or a bar on
+// stderr.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "agail/train/evaluation.h"
+#include "agail/train/progress_csv.h"
+#include "agail/train/tensorboard.h"
+#include "agail/train/trainer.h"
+
+namespace agail {
+
+// Names as stable-baselines3 has them where it has the quantity.
+std::vector<std::string> progress_columns();
+
+class RunLog {
+ public:
+  // Files in `folder`. After a resume `resume_step` is the checkpoint's number of timesteps: what
+  // the files hold of later steps is dropped.
+  RunLog(const std::filesystem::path& folder, std::int64_t total_timesteps,
+         std::optional<std::int64_t> resume_step);
+
+  void update(const UpdateReport& report, const Stopwatch& stopwatch,
+              const std::optional<Evaluation>& evaluation);
+  // Ends the bar, if there is one.
+  void finish();
+
+ private:
+  void show(const UpdateReport& report, double steps_per_second);
+
+  using Clock = std::chrono::steady_clock;
+  std::int64_t total_timesteps_, first_timesteps_;
+  bool terminal_;
+  Clock::time_point begin_ = Clock::now();
+  Clock::time_point shown_;
+  bool bar_open_ = false;
+  std::optional<double> evaluated_return_;
+  ProgressCsv csv_;
+  TensorBoardWriter events_;
+};
+
+}  // namespace agail

@@ -1,0 +1,210 @@
+#include "agail/train/trainer.h"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace agail {
+
+namespace {
+
+constexpr std::size_t kRecentEpisodes = 100;
+
+Index steps_a_lane(const RunSettings& run) {
+  if (run.batch_steps % run.lanes != 0)
+    throw InputError("settings run.batch_steps = " + std::to_string(run.batch_steps) +
+                     " and run.lanes = " + std::to_string(run.lanes) +
+                     " do not fit: every lane takes batch_steps / lanes steps; choose a multiple");
+  return run.batch_steps / run.lanes;
+}
+
+std::string dimensions(int observations, const ActionSpace& action) {
+  return std::to_string(observations) + " observations and " +
+         (action.discrete ? std::to_string(action.n) + " discrete actions"
+                          : std::to_string(action.dim) + " continuous action dimensions");
+}
+
+}  // namespace
+
+Trainer::Trainer(TrainingTask task)
+    : task_(std::move(task)),
+      spec_(environment_spec(task_.environment)),
+      pool_(task_.threads),
+      network_(spec_.observation_dim, task_.settings.policy.hidden, spec_.action),
+      theta_(Vector<float>::Zero(network_.parameters())),
+      normalizer_(spec_.observation_dim, task_.settings.policy.normalize_observations,
+                  task_.settings.policy.observation_clip),
+      collector_(task_.environment, task_.settings.run.lanes, task_.seed, pool_),
+      batch_(spec_.observation_dim, spec_.action.dim, task_.settings.run.lanes,
+             steps_a_lane(task_.settings.run)),
+      value_(spec_.observation_dim, task_.settings.value, pool_, batch_.size(), task_.seed),
+      advantage_(spec_.observation_dim, batch_.size()),
+      trpo_(network_, pool_, task_.settings.trpo, batch_.size()),
+      rewards_(Vector<float>::Zero(batch_.size())) {
+  check();
+  RandomStream random(task_.seed, Purpose::kInitialise, 0);
+  network_.initialise(theta_.data(), random, task_.settings.policy.initial_log_std);
+  start();
+}
+
+void Trainer::check() {
+  if (task_.method == "trpo") {
+    task_.demonstrations.reset();
+    return;
+  }
+  if (!task_.demonstrations)
+    throw InputError("method " + task_.method +
+                     " learns from demonstrations; give them with --demos FILE");
+  Demonstrations& demos = *task_.demonstrations;
+  if (demos.action.dim == 0) {  // the file has no actions and does not say what they would be
+    demos.action = spec_.action;
+    for (DemoEpisode& episode : demos.episodes) {
+      const Index steps = episode.observations.rows() - 1;
+      episode.actions = RowMatrix<double>::Zero(steps, spec_.action.dim);
+      episode.available = RowMatrix<std::uint8_t>::Zero(steps, spec_.action.dim);
+    }
+  }
+  const bool same_kind = demos.action.discrete == spec_.action.discrete &&
+                         demos.action.dim == spec_.action.dim && demos.action.n <= spec_.action.n;
+  if (demos.observation_dim != spec_.observation_dim || !same_kind)
+    throw InputError("the demonstrations have " + dimensions(demos.observation_dim, demos.action) +
+                     ", " + spec_.id + " has " + dimensions(spec_.observation_dim, spec_.action) +
+                     "; give demonstrations of this environment");
+  if (demos.transitions() == 0)
+    throw InputError("the demonstrations have no steps; record at least one episode");
+  demos.action = spec_.action;
+}
+
+void Trainer::start() {
+  const Settings& settings = task_.settings;
+  if (task_.method == "trpo") return;
+  demos_ = std::make_unique<DemoData>(*task_.demonstrations);
+  const double missing = task_.demonstrations->missing_ratio();
+  const bool adversarial = task_.method != "bc";
+  if (adversarial)
+    reward_ = std::make_unique<AdversarialReward>(task_.method, *demos_, spec_.action, missing,
+                                                  settings, pool_, batch_.size(), task_.seed);
+
+  // state-gail is the method that never looks at an action.
+  const bool has_actions = !demos_->some_action.empty() && task_.method != "state-gail";
+  if (!adversarial && !has_actions)
+    throw InputError(
+        "method bc learns from actions, but the demonstrations have none; use --method agail or "
+        "state-gail");
+  const bool clones = !adversarial || (has_actions && settings.start.method != "random");
+  normalizer_frozen_ = clones || settings.policy.freeze_normalizer;
+  if (normalizer_frozen_) normalizer_.update(pool_, demos_->states);
+  if (!has_actions) return;
+
+  const bool infers = adversarial && settings.start.method == "clone-inferred" && missing > 0;
+  CloningTargets targets{demos_->actions, demos_->available, demos_->some_action};
+  if (infers) {
+    inverse_dynamics_ =
+        infer_missing_actions(*demos_, spec_.action, settings.inverse_dynamics,
+                              settings.policy.observation_clip, pool_, task_.seed, targets.actions);
+    targets.available.setOnes();
+    targets.columns.resize(static_cast<std::size_t>(demos_->size()));
+    std::iota(targets.columns.begin(), targets.columns.end(), Index{0});
+  }
+  if (clones) {
+    cloning_ = clone_policy(network_, normalizer_, *demos_, targets, settings.bc, !adversarial,
+                            pool_, task_.seed, theta_);
+    value_warmup_ = adversarial ? settings.start.value_warmup : 0;
+  }
+  if (adversarial && settings.clone.weight > 0)
+    cloning_term_ = std::make_unique<CloningTerm>(
+        network_, normalizer_, *demos_, std::move(targets), settings.clone, pool_, task_.seed);
+}
+
+UpdateReport Trainer::update() {
+  const Settings& settings = task_.settings;
+  const Index n = batch_.size();
+  const auto number = static_cast<std::uint32_t>(updates_);
+  UpdateReport report;
+  stopwatch_.start(Phase::kRest);
+
+  // Roll out the policy.
+  collector_.collect(network_, theta_, normalizer_, batch_, stopwatch_);
+  timesteps_ += n;
+  for (const FinishedEpisode& episode : batch_.finished) {
+    const auto slot = static_cast<std::size_t>(episodes_++) % kRecentEpisodes;
+    recent_returns_.resize(std::max(recent_returns_.size(), slot + 1));
+    recent_lengths_.resize(recent_returns_.size());
+    recent_returns_[slot] = episode.episode_return;
+    recent_lengths_[slot] = episode.length;
+  }
+  diverged_ += batch_.diverged;
+
+  // Rewards: the environment's, or those of discriminator and guide, which learn first.
+  double terminal_value = 0;
+  if (reward_) {
+    report.imitation =
+        reward_->update(batch_, {network_, theta_, normalizer_}, number, rewards_, stopwatch_);
+    terminal_value = settings.reward.terminal_value;
+  } else {
+    rewards_ = batch_.rewards;
+  }
+
+  stopwatch_.start(Phase::kValue);
+  advantage_.estimate(batch_, rewards_, value_, normalizer_, settings.trpo, terminal_value);
+  report.explained_variance = advantage_.explained_variance(n);
+  advantage_.normalize(n);
+  stopwatch_.start(Phase::kRest);
+
+  if (value_warmup_ > 0)
+    --value_warmup_;
+  else
+    report.trpo = trpo_.update(theta_, batch_.inputs, batch_.actions, advantage_.advantages(), n,
+                               cloning_term_.get(), stopwatch_);
+  if (report.trpo && cloning_term_) report.clone_log_likelihood = cloning_term_->log_likelihood();
+
+  stopwatch_.start(Phase::kValue);
+  value_.fit(batch_.inputs, advantage_.targets(), n, number);
+  stopwatch_.start(Phase::kRest);
+
+  if (!normalizer_frozen_) normalizer_.update(pool_, batch_.observations);
+  ++updates_;
+
+  const auto mean = [](const std::vector<double>& v) {
+    return v.empty() ? std::numeric_limits<double>::quiet_NaN()
+                     : std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
+  };
+  report.update = updates_;
+  report.timesteps = timesteps_;
+  report.episode_return = mean(recent_returns_);
+  report.episode_length = mean(recent_lengths_);
+  report.episodes = episodes_;
+  report.diverged = diverged_;
+  if (!spec_.action.discrete)
+    report.mean_std =
+        theta_.tail(network_.distribution.log_stds()).cast<double>().array().exp().mean();
+  return report;
+}
+
+SavedPolicy Trainer::policy() const {
+  PolicyInfo info{spec_.id, task_.method, timesteps_, task_.settings_toml, {}};
+  if (task_.demonstrations && task_.demonstrations->has_rewards())
+    info.demonstrations_mean_return = task_.demonstrations->mean_return();
+  return {std::move(info), spec_.observation_dim,
+          spec_.action,    task_.settings.policy.hidden,
+          normalizer_,     theta_};
+}
+
+void Trainer::archive(Archive& a) {
+  a("theta", std::span<float>(theta_.data(), static_cast<std::size_t>(theta_.size())));
+  a("timesteps", timesteps_);
+  a("updates", updates_);
+  a("episodes", episodes_);
+  a("diverged", diverged_);
+  a("value_warmup", value_warmup_);
+  a.resizable("recent_returns", recent_returns_);
+  a.resizable("recent_lengths", recent_lengths_);
+  a.scope("normalizer", [&](Archive& inner) { normalizer_.archive(inner); });
+  a.scope("value", [&](Archive& inner) { value_.archive(inner); });
+  a.scope("lane", [&](Archive& inner) { collector_.archive(inner); });
+  if (reward_) a.scope("reward", [&](Archive& inner) { reward_->archive(inner); });
+  if (cloning_term_)
+    a.scope("cloning_term", [&](Archive& inner) { cloning_term_->archive(inner); });
+}
+
+}  // namespace agail

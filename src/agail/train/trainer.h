@@ -1,0 +1,102 @@
+// The one training loop. Methods differ in where the reward comes from (environment | discriminator
+// | discriminator and guide), in how the policy starts, and in a cloning term of its objective.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "agail/base/stopwatch.h"
+#include "agail/imitation/agail.h"
+#include "agail/imitation/behavior_cloning.h"
+#include "agail/imitation/inverse_dynamics.h"
+#include "agail/rl/advantage.h"
+#include "agail/rl/trpo.h"
+#include "agail/train/saved_policy.h"
+
+namespace agail {
+
+struct TrainingTask {
+  std::string environment;
+  std::string method;  // trpo gail state-gail agail bc
+  Settings settings;
+  std::string settings_toml;
+  std::uint64_t seed = 0;
+  int threads = 1;
+  std::optional<Demonstrations> demonstrations;  // all methods but trpo
+};
+
+// What one update did. Parts that do not exist are absent.
+struct UpdateReport {
+  std::int64_t update = 0;     // number of updates so far
+  std::int64_t timesteps = 0;  // environment steps so far
+  double episode_return =
+      0;  // mean over the last 100 finished training episodes; NaN before the first
+  double episode_length = 0;
+  std::int64_t episodes = 0;       // finished so far
+  std::int64_t diverged = 0;       // of these, ended by a broken simulation
+  std::optional<TrpoReport> trpo;  // absent while only the value network learns
+  double explained_variance = 0;
+  double mean_std = 0;  // of continuous actions
+  std::optional<ImitationReport> imitation;
+  std::optional<double> clone_log_likelihood;
+};
+
+class Trainer {
+ public:
+  // Checks that task and demonstrations fit together (InputError) and builds everything; a cloned
+  // start is fitted here.
+  explicit Trainer(TrainingTask task);
+
+  // Collects a batch and learns from it. Not for bc, which is done once constructed.
+  UpdateReport update();
+
+  std::int64_t timesteps() const { return timesteps_; }
+  bool finished() const {
+    return !learns_by_interaction() || timesteps_ >= task_.settings.run.timesteps;
+  }
+  bool learns_by_interaction() const { return task_.method != "bc"; }
+  const TrainingTask& task() const { return task_; }
+  ThreadPool& pool() { return pool_; }
+  SavedPolicy policy() const;
+
+  // How the policy was cloned, and how missing actions were inferred before that.
+  const std::optional<RegressionReport>& cloning() const { return cloning_; }
+  const std::optional<RegressionReport>& inverse_dynamics() const { return inverse_dynamics_; }
+
+  // Everything that the next update depends on.
+  void archive(Archive& a);
+
+  // For benchmarks: the collector before an update, and what the update collected and cost.
+  Collector& collector() { return collector_; }
+  const Batch& batch() const { return batch_; }
+  const Stopwatch& stopwatch() const { return stopwatch_; }
+
+ private:
+  void check();
+  void start();
+
+  TrainingTask task_;
+  EnvironmentSpec spec_;
+  ThreadPool pool_;
+  std::unique_ptr<DemoData> demos_;
+  PolicyNetwork<float> network_;
+  Vector<float> theta_;
+  Normalizer normalizer_;
+  bool normalizer_frozen_ = false;
+  Collector collector_;
+  Batch batch_;
+  ValueFunction value_;
+  AdvantageEstimator advantage_;
+  Trpo trpo_;
+  std::unique_ptr<AdversarialReward> reward_;
+  std::unique_ptr<CloningTerm> cloning_term_;
+  std::optional<RegressionReport> cloning_, inverse_dynamics_;
+  Vector<float> rewards_;
+  Stopwatch stopwatch_;
+
+  std::int64_t timesteps_ = 0, updates_ = 0, episodes_ = 0, diverged_ = 0, value_warmup_ = 0;
+  std::vector<double> recent_returns_, recent_lengths_;  // of the last 100 episodes, a ring
+};
+
+}  // namespace agail
