@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +15,7 @@
 #include "agail/demos/metadata_keys.h"
 #include "agail/demos/read_episode.h"
 #include "agail/demos/spaces_json.h"
+#include "agail/demos/trial.h"
 
 namespace agail {
 namespace {
@@ -173,10 +175,14 @@ Demonstrations read(const hdf5::Group& root, const json& metadata, const std::st
   return demonstrations;
 }
 
-}  // namespace
+// Many times what any sound file takes; what takes longer goes round in circles.
+unsigned patience(std::uintmax_t bytes) { return 5 + 2 * static_cast<unsigned>(bytes >> 20); }
 
-Demonstrations read_demonstrations(const std::string& path_or_id) {
-  const DatasetLocation location = locate_dataset(path_or_id);
+[[noreturn]] void damaged(const std::string& where) {
+  throw InputError(where + " is damaged so that it cannot be read; copy or record it again");
+}
+
+Demonstrations read_file_at(const DatasetLocation& location) {
   json metadata;
   if (!location.metadata.empty()) {
     const std::vector<std::uint8_t> bytes = read_file(location.metadata, std::size_t{64} << 20);
@@ -189,10 +195,26 @@ Demonstrations read_demonstrations(const std::string& path_or_id) {
   return read(file.root(), metadata, location.metadata.empty() ? location.data : location.metadata);
 }
 
-Demonstrations read_demonstrations(std::span<const std::uint8_t> bytes, const std::string& name) {
+Demonstrations read_bytes(std::span<const std::uint8_t> bytes, const std::string& name) {
   hdf5::File file = hdf5::File::from_image(bytes, name);
   const json metadata = root_metadata(file.root());
   return read(file.root(), metadata, name);
+}
+
+}  // namespace
+
+Demonstrations read_demonstrations(const std::string& path_or_id) {
+  const DatasetLocation location = locate_dataset(path_or_id);
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(location.data, error);
+  if (!error && !survives_trial([&] { read_file_at(location); }, patience(size)))
+    damaged(location.data);
+  return read_file_at(location);
+}
+
+Demonstrations read_demonstrations(std::span<const std::uint8_t> bytes, const std::string& name) {
+  if (!survives_trial([&] { read_bytes(bytes, name); }, patience(bytes.size()))) damaged(name);
+  return read_bytes(bytes, name);
 }
 
 }  // namespace agail

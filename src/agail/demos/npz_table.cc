@@ -1,5 +1,6 @@
 #include "agail/demos/npz_table.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -78,6 +79,8 @@ Array parse_npy(const std::vector<std::uint8_t>& bytes, const std::string& where
   Array array;
   const std::size_t columns = shape.size() == 1 ? 1 : shape[1];
   const auto width = static_cast<std::size_t>(type[1] - '0');
+  if (std::string("fiub").find(type[0]) == std::string::npos)
+    fail("does not hold plain numbers; use float32, float64 or int64");
   const std::size_t data = bytes.size() - prefix - length;
   if (type.size() != 2 || width == 0)
     fail("does not hold plain numbers; use float32, float64 or int64");
