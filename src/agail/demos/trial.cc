@@ -1,6 +1,7 @@
 #include "agail/demos/trial.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,7 +12,9 @@ namespace agail {
 namespace {
 
 [[noreturn]] void run_child(const std::function<void()>& work, unsigned cpu_seconds) {
-  // Quietly: no core file, no message of a sanitizer or of libc.
+  // Quietly: nobody else's signal handlers, no core file, no message of a sanitizer or of libc.
+  for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU})
+    ::signal(signal, SIG_DFL);
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
   const rlimit cpu{cpu_seconds, cpu_seconds};
