@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "agail/base/crc32c.h"
 #include "agail/config/resolve.h"
@@ -94,12 +95,9 @@ ordered_json measure(const Options& options, const std::string& environment) {
     split[kPhaseNames[p]] = microseconds(spent);
   }
   split["rest"] = microseconds(training - named);
-  const std::vector<std::uint8_t> bytes = [&] {
-    const Vector<float>& theta = trainer.policy().theta();
-    const auto* data = reinterpret_cast<const std::uint8_t*>(theta.data());
-    return std::vector<std::uint8_t>(data,
-                                     data + static_cast<std::size_t>(theta.size()) * sizeof(float));
-  }();
+  const SavedPolicy policy = trainer.policy();
+  const auto* theta = reinterpret_cast<const std::uint8_t*>(policy.theta().data());
+  const std::span bytes(theta, static_cast<std::size_t>(policy.theta().size()) * sizeof(float));
   char signature[16];
   std::snprintf(signature, sizeof signature, "%08x", crc32c(bytes));
   return {{"environment", environment},

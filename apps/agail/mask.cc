@@ -63,7 +63,8 @@ void add_mask(CLI::App& app) {
   command
       ->add_option("--seed", options->seed,
                    "Which entries go; a larger share contains a smaller one")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
   command->callback([options, dimension] { run(*options, dimension->count() > 0); });
 }
 

@@ -39,7 +39,7 @@ void add_record(CLI::App& app) {
       ->add_option("--out", options->out,
                    "x.hdf5: one file; any other name: a Minari dataset folder")
       ->required();
-  command->add_option("--seed", options->seed, "Names the episodes");
+  command->add_option("--seed", options->seed, "Names the episodes")->check(CLI::NonNegativeNumber);
   command->add_flag("--stochastic", options->stochastic,
                     "Sample actions instead of taking the mode");
   command->callback([options] { run(*options); });

@@ -88,7 +88,8 @@ void add_train(CLI::App& app) {
       ->add_option("--timesteps", options->timesteps,
                    "Stop after the first update at or past this many steps")
       ->check(CLI::PositiveNumber);
-  command->add_option("--seed", options->seed, "Names all random numbers");
+  command->add_option("--seed", options->seed, "Names all random numbers")
+      ->check(CLI::NonNegativeNumber);
   command
       ->add_option("--threads", options->threads, "Default: the cores of this machine or container")
       ->check(CLI::Range(1, 4096));
