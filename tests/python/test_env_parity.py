@@ -35,9 +35,9 @@ LOCOMOTION = [id for ids in MODELS.values() for id in ids]
 CARTPOLE = ["CartPole-v0", "CartPole-v1"]
 
 # Differences allowed in observation and reward; 0 means the same bits.
-TOLERANCE = {id: 0.0 for id in LOCOMOTION}
+TOLERANCE = dict.fromkeys(LOCOMOTION, 0.0)
 # NumPy's sine and cosine are not those of the C library on every CPU (SIMD versions, 1 ulp apart).
-TOLERANCE |= {id: 1e-12 for id in CARTPOLE}
+TOLERANCE |= dict.fromkeys(CARTPOLE, 1e-12)
 
 
 def probe(*arguments, stdin=b""):
@@ -65,8 +65,16 @@ def parse_specs():
         id, *words = line.split()
         observation, float32, discrete, action, limit, saved = map(int, words[:6])
         bounds = np.array(words[6:], dtype=np.float32)
-        specs[id] = dict(observation=observation, float32=bool(float32), discrete=bool(discrete), action=action,
-                         limit=limit, saved=saved, low=bounds[: len(bounds) // 2], high=bounds[len(bounds) // 2 :])
+        specs[id] = dict(
+            observation=observation,
+            float32=bool(float32),
+            discrete=bool(discrete),
+            action=action,
+            limit=limit,
+            saved=saved,
+            low=bounds[: len(bounds) // 2],
+            high=bounds[len(bounds) // 2 :],
+        )
     return specs
 
 
@@ -79,7 +87,9 @@ def specs():
 def report():
     rows = []
     yield rows
-    print(f"\n{'environment':16} {'states':>7} {'ended':>6} {'max |obs diff|':>15} {'max |reward diff|':>18} same bits")
+    print(
+        f"\n{'environment':16} {'states':>7} {'ended':>6} {'max |obs diff|':>15} {'max |reward diff|':>18} same bits"
+    )
     for row in rows:
         print("{:16} {:7} {:6} {:15.3g} {:18.3g} {}".format(*row))
 
@@ -90,7 +100,9 @@ def test_every_environment_is_compared(specs):
 
 @pytest.mark.parametrize("id", CARTPOLE + LOCOMOTION)
 def test_spec(id, specs):
-    assert id in gymnasium.registry, "all ids, the old v0 and v4 among them, are registered in Gymnasium 1.4"
+    assert id in gymnasium.registry, (
+        "all ids, the old v0 and v4 among them, are registered in Gymnasium 1.4"
+    )
     env, ours = make(id), specs[id]
     assert env.observation_space.shape == (ours["observation"],)
     assert env.observation_space.dtype == (np.float32 if ours["float32"] else np.float64)
@@ -137,11 +149,17 @@ def test_model_fields(name, id):
     theirs = numbers(make(id).unwrapped.model)
     assert set(ours) == set(theirs)
     physics = [field for field in sorted(theirs) if not field.startswith(NOT_PHYSICS)]
-    assert len(physics) > 300 and {"body_mass", "geom_friction", "opt.timestep", "stat.meaninertia"} <= set(physics)
+    assert len(physics) > 300 and {
+        "body_mass",
+        "geom_friction",
+        "opt.timestep",
+        "stat.meaninertia",
+    } <= set(physics)
     different = [
         field
         for field in physics
-        if ours[field].shape != theirs[field].shape or ours[field].tobytes() != theirs[field].tobytes()
+        if ours[field].shape != theirs[field].shape
+        or ours[field].tobytes() != theirs[field].tobytes()
     ]
     assert different == []
 
@@ -181,7 +199,9 @@ def locomotion_cases(id, spec, random):
         if len(states) % 40 == 0:  # a trajectory of 40 steps, past termination
             env.reset(seed=len(states))
             kind = len(states) // 40 % 3
-        elif kind == 1 or (kind == 2 and len(states) % 8 == 0):  # away from where the trajectory goes
+        elif kind == 1 or (
+            kind == 2 and len(states) % 8 == 0
+        ):  # away from where the trajectory goes
             state = integration_state(env)
             scale = 10 ** random.uniform(-3, 0.3)
             span = slice(1, 1 + env.model.nq + env.model.nv)
@@ -190,10 +210,15 @@ def locomotion_cases(id, spec, random):
             # The derived quantities of this state; the forward pass moves the solver's warm start, so set it again.
             mujoco.mj_forward(env.model, env.data)
             mujoco.mj_setState(env.model, env.data, state, INTEGRATION)
-        before = np.concatenate([[random.integers(900)], [progress(id, env)], integration_state(env), env._get_obs()])
+        before = np.concatenate(
+            [[random.integers(900)], [progress(id, env)], integration_state(env), env._get_obs()]
+        )
         action = draw_action(env, random)
         observation, reward, terminated, truncated, _ = env.step(action)
-        if any(env.data.warning[w].number for w in range(len(env.data.warning))) or not np.isfinite(observation).all():
+        if (
+            any(env.data.warning[w].number for w in range(len(env.data.warning)))
+            or not np.isfinite(observation).all()
+        ):
             env.reset(seed=len(states))  # the simulation broke down: nothing to compare
             continue
         states.append(before)
@@ -220,8 +245,12 @@ def cartpole_cases(id, spec, random):
 
 
 def our_steps(id, spec, states, actions):
-    records = b"".join(np.asarray(np.concatenate(pair), np.float64).tobytes() for pair in zip(states, actions))
-    return np.frombuffer(probe("step", id, stdin=records)).reshape(len(states), spec["observation"] + 4)
+    records = b"".join(
+        np.asarray(np.concatenate(pair), np.float64).tobytes() for pair in zip(states, actions)
+    )
+    return np.frombuffer(probe("step", id, stdin=records)).reshape(
+        len(states), spec["observation"] + 4
+    )
 
 
 @pytest.mark.parametrize("id", CARTPOLE + LOCOMOTION)
@@ -239,12 +268,24 @@ def test_single_steps(id, specs, report):
     observation_difference = np.abs(ours[:, :n] - observations).max()
     reward_difference = np.abs(ours[:, n] - rewards).max()
     same = np.array_equal(ours[:, :n], observations) and np.array_equal(ours[:, n], rewards)
-    report.append((id, len(states), int(ended.sum()), observation_difference, reward_difference, "yes" if same else "no"))
+    report.append(
+        (
+            id,
+            len(states),
+            int(ended.sum()),
+            observation_difference,
+            reward_difference,
+            "yes" if same else "no",
+        )
+    )
     assert observation_difference <= TOLERANCE[id]
     assert reward_difference <= TOLERANCE[id]
     assert np.array_equal(ours[:, n + 1], ended)
     assert not ours[:, n + 2 :].any(), "neither truncated nor diverged"
-    assert not id.startswith(("Hopper", "Walker", "Humanoid", "Ant", "CartPole")) or 0 < ended.sum() < STATES
+    assert (
+        not id.startswith(("Hopper", "Walker", "Humanoid", "Ant", "CartPole"))
+        or 0 < ended.sum() < STATES
+    )
 
 
 @pytest.mark.parametrize("id", CARTPOLE + LOCOMOTION)
@@ -269,7 +310,9 @@ def test_time_limit(id, specs):
 def test_reset_is_gymnasiums_of_the_same_noise(id, specs):
     """The random numbers differ; the state, the observation and the progress that follow from qpos and qvel do not."""
     env = make(id).unwrapped
-    saved_states = np.frombuffer(probe("reset", id, stdin=np.arange(20.0).tobytes())).reshape(20, -1)
+    saved_states = np.frombuffer(probe("reset", id, stdin=np.arange(20.0).tobytes())).reshape(
+        20, -1
+    )
     for saved in saved_states:
         state = saved[2 : len(saved) - specs[id]["observation"]]
         mujoco.mj_resetData(env.model, env.data)
@@ -295,7 +338,10 @@ def test_reset_noise_has_gymnasiums_distribution(id, specs):
         for i in range(200):
             env.reset(seed=i)
             theirs.append(np.concatenate([env.data.qpos - env.init_qpos, env.data.qvel]))
-        theirs, ours = np.array(theirs), saved[:, 3 : 3 + nq + nv] - np.concatenate([env.init_qpos, np.zeros(nv)])
+        theirs, ours = (
+            np.array(theirs),
+            saved[:, 3 : 3 + nq + nv] - np.concatenate([env.init_qpos, np.zeros(nv)]),
+        )
         groups = [(ours[:, :nq], theirs[:, :nq]), (ours[:, nq:], theirs[:, nq:])]
     for ours, theirs in groups:
         assert ours.std() == pytest.approx(theirs.std(), rel=0.08)

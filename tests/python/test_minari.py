@@ -130,7 +130,9 @@ def test_minari_reads_the_mask(datasets, pattern):
 
 def test_the_environment_is_recovered(datasets):
     cartpole()
-    agail("mask", "cartpole/random-v0", "--missing", "0.5", "--out", datasets / "cartpole" / "part-v0")
+    agail(
+        "mask", "cartpole/random-v0", "--missing", "0.5", "--out", datasets / "cartpole" / "part-v0"
+    )
     dataset = minari.load_dataset("cartpole/part-v0")
     assert dataset.env_spec == gym.spec("CartPole-v1")
     env = dataset.recover_environment()
@@ -142,7 +144,9 @@ def test_the_environment_is_recovered(datasets):
     assert [m["seed"] for m in dataset.storage.get_episode_metadata(range(3))] == [0, 1, 2]
 
 
-@pytest.mark.parametrize("name", ["Hopper-v5", "Humanoid-v4", "CartPole-v0", "Ant-v5", "Swimmer-v4"])
+@pytest.mark.parametrize(
+    "name", ["Hopper-v5", "Humanoid-v4", "CartPole-v0", "Ant-v5", "Swimmer-v4"]
+)
 def test_specs_are_those_of_gymnasium(tmp_path, datasets, name):
     dims = {"Hopper-v5": (11, 3), "Humanoid-v4": (376, 17), "CartPole-v0": (4, 1), "Ant-v5": (105, 8),
             "Swimmer-v4": (8, 2)}[name]  # fmt: skip
@@ -182,7 +186,10 @@ def test_the_mask_survives_minaris_other_formats(tmp_path, datasets, form, patte
         np.testing.assert_array_equal(a.actions, b.actions)
         np.testing.assert_array_equal(a.infos["action_available"], b.infos["action_available"])
     if form == "hdf5":
-        assert inspect(tmp_path / "copy")["missing_ratio"] == inspect(datasets / "part-v0")["missing_ratio"]
+        assert (
+            inspect(tmp_path / "copy")["missing_ratio"]
+            == inspect(datasets / "part-v0")["missing_ratio"]
+        )
     else:
         assert "another format" in agail("inspect", tmp_path / "copy", status=2)
 
@@ -269,7 +276,7 @@ def test_npz_variants_agree(tmp_path):
         rewards=given["rewards"][keep],
         episode_starts=[0, 30],
     )
-    with open(tmp_path / "d.csv", "w") as file:
+    with (tmp_path / "d.csv").open("w") as file:
         print(
             *(f"obs_{i}" for i in range(11)),
             *(f"action_{i}" for i in range(3)),
@@ -308,7 +315,9 @@ def test_missing_actions_of_arrays_stay_missing(tmp_path):
 )
 def test_wrong_input_is_one_line_and_exit_2(datasets, arguments):
     hopper(datasets)
-    error = agail("mask", datasets / "hopper-v0", *arguments, "--out", datasets / "x.hdf5", status=2)
+    error = agail(
+        "mask", datasets / "hopper-v0", *arguments, "--out", datasets / "x.hdf5", status=2
+    )
     assert len(error.strip().splitlines()) == 1
     assert not (datasets / "x.hdf5").exists()
 
