@@ -60,8 +60,8 @@ void AdvantageEstimator::normalize(Index n) {
 }
 
 double AdvantageEstimator::explained_variance(Index n) const {
-  const Eigen::ArrayXd target = targets_.head(n).cast<double>();
-  const Eigen::ArrayXd error = target - values_.head(n).cast<double>().array();
+  const auto target = targets_.head(n).cast<double>().array();
+  const auto error = target - values_.head(n).cast<double>().array();
   const double total = (target - target.mean()).square().mean();
   return total > 0 ? 1 - (error - error.mean()).square().mean() / total : 0;
 }
