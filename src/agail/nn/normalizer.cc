@@ -67,7 +67,11 @@ void Normalizer::set(const Vector<double>& mean, const Vector<double>& standard_
 
 void Normalizer::refresh() {
   shift_ = mean_.cast<float>();
-  scale_ = standard_deviation().cwiseInverse().cast<float>();
+  if (!enabled_ || count_ == 0)
+    scale_ = Vector<float>::Ones(mean_.size());
+  else
+    scale_ =
+        (squares_ / count_).array().max(kVarianceFloor).sqrt().inverse().matrix().cast<float>();
 }
 
 void Normalizer::apply(const float* x, float* y) const {
