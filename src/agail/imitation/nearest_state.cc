@@ -42,14 +42,18 @@ NearestState::NearestState(const DemoData& demos, const std::vector<Index>& colu
 NearestState::~NearestState() = default;
 
 Index NearestState::find(const float* state) const {
-  thread_local std::vector<float> x;
+  thread_local std::vector<float> x, distances;
   x.resize(static_cast<std::size_t>(normalizer_.size()) + 1);
   normalizer_.apply(state, x.data());
   std::size_t found = 0;
   float squared_distance = 0;
   nanoflann::KNNResultSet<float> result(1);
   result.init(&found, &squared_distance);
-  tree_->index.findNeighbors(result, x.data(), nanoflann::SearchParams());
+  // What findNeighbors() does, with work space that outlives the call.
+  const Tree::Index_& index = tree_->index;
+  distances.assign(x.size(), 0);
+  const float start = index.computeInitialDistances(index, x.data(), distances);
+  index.searchLevel(result, x.data(), index.root_node, start, distances, 1);
   return columns_[found];
 }
 
