@@ -42,6 +42,8 @@ Trainer::Trainer(TrainingTask task)
       trpo_(network_, pool_, task_.settings.trpo, batch_.size()),
       rewards_(Vector<float>::Zero(batch_.size())) {
   check();
+  recent_returns_.reserve(kRecentEpisodes);
+  recent_lengths_.reserve(kRecentEpisodes);
   RandomStream random(task_.seed, Purpose::kInitialise, 0);
   network_.initialise(theta_.data(), random, task_.settings.policy.initial_log_std);
   start();
