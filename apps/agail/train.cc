@@ -96,13 +96,18 @@ void add_train(CLI::App& app) {
   command->add_option("--lanes", options->lanes, "Environments that collect a batch side by side")
       ->check(CLI::PositiveNumber);
   command->add_flag("--resume", options->resume, "Go on with the run in --out");
-  command->add_flag_callback(
-      "--help-settings",
-      [] {
-        std::cout << settings_help();
-        throw CLI::Success();
-      },
-      "Print every setting and exit");
+  const auto print_and_exit = [command](const std::string& flag, std::string (*text)(),
+                                        const std::string& help) {
+    command->add_flag_callback(
+        flag,
+        [text] {
+          std::cout << text();
+          throw CLI::Success();
+        },
+        help);
+  };
+  print_and_exit("--help-settings", settings_help, "Print every setting and exit");
+  print_and_exit("--help-settings-markdown", settings_markdown, "The same as the reference page");
   command->callback([options, preset] { run(*options, preset->count() > 0); });
 }
 

@@ -78,6 +78,7 @@ struct RewardSettings {
 // How the policy of gail and agail starts.
 struct StartSettings {
   std::string method = "random";
+  double log_std = -1;            // of a cloned policy's continuous actions
   std::int64_t value_warmup = 0;  // batches that fit the value network only
 };
 

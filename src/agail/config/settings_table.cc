@@ -74,6 +74,7 @@ std::span<const Setting> settings_table() {
     {AGAIL_SETTING(reward.terminal_value), any(), "", "value of the state after a termination, when imitating"},
 
     {AGAIL_SETTING(start.method), one_of({"random", "clone", "clone-inferred"}), "", "how the policy starts: with random weights, cloned from the available actions, or from available and inferred ones"},
+    {AGAIL_SETTING(start.log_std), between(-20, 5), "", "log standard deviation of continuous actions, if the policy starts cloned"},
     {AGAIL_SETTING(start.value_warmup), at_least(0), "batches", "batches at the start that only the value network learns from"},
 
     {AGAIL_SETTING(clone.weight), at_least(0), "", "weight of the cloning term in the policy's objective at the start"},

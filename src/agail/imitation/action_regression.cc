@@ -152,7 +152,7 @@ RegressionReport fit_actions(const PolicyNetwork<float>& network, Vector<float>&
           whole.loss(theta, x, actions, available, validation.data(), held);
       if (validation_loss >= report.validation_loss) continue;
       report.validation_loss = validation_loss;
-      report.r_squared = whole.quality(held);
+      report.quality = whole.quality(held);
       best = theta;
     }
     report.best_epoch = epoch;

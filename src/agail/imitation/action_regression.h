@@ -13,9 +13,8 @@ struct RegressionReport {
   std::int64_t best_epoch = 0;  // whose parameters were kept
   double training_loss = 0;
   double validation_loss =
-      0;  // continuous: mean of sum_i (a_i - mean_i)^2 / 2; discrete: -log p(a)
-  double r_squared =
-      0;  // continuous: explained variance of held-out entries; discrete: share right
+      0;               // continuous: mean of sum_i (a_i - mean_i)^2 / 2; discrete: -log p(a)
+  double quality = 0;  // continuous: explained variance of held-out entries; discrete: share right
 };
 
 struct RegressionSettings {

@@ -12,8 +12,7 @@ namespace {
 
 constexpr const char* kFormat = "agail-checkpoint-1";
 
-std::map<std::string, std::string> identity(const Trainer& trainer) {
-  const TrainingTask& task = trainer.task();
+std::map<std::string, std::string> identity(const TrainingTask& task) {
   // A run may be made longer, and evaluated or saved more or less often, without becoming another.
   Settings settings = task.settings;
   settings.run.timesteps = 1;
@@ -38,27 +37,25 @@ void walk(Archive& archive, Trainer& trainer, double& best_return) {
 
 }  // namespace
 
-std::filesystem::path checkpoint_file(const std::filesystem::path& folder) {
-  return folder / "checkpoints" / "latest.safetensors";
-}
+CheckpointFile::CheckpointFile(const std::filesystem::path& folder, const TrainingTask& task)
+    : file_(folder / "checkpoints" / "latest.safetensors"), identity_(identity(task)) {}
 
-void save_checkpoint(const std::filesystem::path& folder, Trainer& trainer, double& best_return) {
+void CheckpointFile::save(Trainer& trainer, double& best_return) const {
   TensorStore store;
-  store.metadata = identity(trainer);
+  store.metadata = identity_;
   Archive archive(store, Archive::Mode::kSave);
   walk(archive, trainer, best_return);
-  write_file_atomically(checkpoint_file(folder), to_safetensors(store));
+  write_file_atomically(file_, to_safetensors(store));
 }
 
-bool load_checkpoint(const std::filesystem::path& folder, Trainer& trainer, double& best_return) {
-  const std::filesystem::path file = checkpoint_file(folder);
-  if (!std::filesystem::exists(file)) return false;
-  TensorStore store = from_safetensors(read_file(file), file.string(), Checksum::kRequired);
-  for (const auto& [key, value] : identity(trainer)) {
+bool CheckpointFile::load(Trainer& trainer, double& best_return) const {
+  if (!std::filesystem::exists(file_)) return false;
+  TensorStore store = from_safetensors(read_file(file_), file_.string(), Checksum::kRequired);
+  for (const auto& [key, value] : identity_) {
     const auto found = store.metadata.find(key);
     if (found == store.metadata.end() || found->second != value)
       throw InputError(
-          file.string() + ": the checkpoint was made with other " + key +
+          file_.string() + ": the checkpoint was made with other " + key +
           "; resume with what the run was started with, or start a new run in another folder");
   }
   Archive archive(store, Archive::Mode::kLoad);

@@ -1,6 +1,7 @@
 #include "agail/train/run.h"
 
 #include <chrono>
+#include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -44,6 +45,7 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
                      {"standard_error", evaluation->standard_error()},
                      {"mean_length", evaluation->mean_length()}};
   };
+  add("cloned_evaluation", outcome.cloned);
   add("best_evaluation", outcome.best);
   add("last_evaluation", outcome.last);
   const auto regression = [&](const char* name, const std::optional<RegressionReport>& report) {
@@ -51,7 +53,7 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
       summary[name] = {{"epochs", report->epochs},
                        {"best_epoch", report->best_epoch},
                        {"validation_loss", report->validation_loss},
-                       {"r_squared", report->r_squared}};
+                       {"held_out_quality", report->quality}};
   };
   regression("inverse_dynamics", trainer.inverse_dynamics());
   regression("cloning", trainer.cloning());
@@ -71,6 +73,17 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
   write_file_atomically(folder / "summary.json", summary.dump(2) + "\n");
 }
 
+// How good the fits before the first update were, on what they had not seen.
+void tell_start(const Trainer& trainer) {
+  const char* measure =
+      environment_spec(trainer.task().environment).action.discrete ? "right" : "R^2";
+  if (trainer.inverse_dynamics())
+    std::fprintf(stderr, "missing actions inferred (inverse dynamics, held-out %s %.3f)\n", measure,
+                 trainer.inverse_dynamics()->quality);
+  if (trainer.cloning())
+    std::fprintf(stderr, "policy cloned (held-out %s %.3f)\n", measure, trainer.cloning()->quality);
+}
+
 }  // namespace
 
 RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) {
@@ -84,7 +97,9 @@ RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) 
 
   RunOutcome outcome;
   double best_return = -std::numeric_limits<double>::max();
-  const bool resumed = resume && load_checkpoint(folder, trainer, best_return);
+  const CheckpointFile checkpoint(folder, trainer.task());
+  const bool resumed = resume && checkpoint.load(trainer, best_return);
+  tell_start(trainer);
   write_file_atomically(folder / "config.toml", trainer.task().settings_toml);
   RunLog log(folder, run.timesteps, resumed ? std::optional(trainer.timesteps()) : std::nullopt);
 
@@ -100,6 +115,9 @@ RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) 
     return outcome.last;
   };
 
+  if (trainer.cloning() && trainer.learns_by_interaction() && !resumed && run.evaluate_every > 0)
+    outcome.cloned = evaluate_now();
+
   // An interrupt waits for the update and its evaluation: a second or so.
   while (!trainer.finished() && interrupted() == 0) {
     const UpdateReport report = trainer.update();
@@ -108,7 +126,7 @@ RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) 
       evaluation = evaluate_now();
     log.update(report, trainer.stopwatch(), evaluation);
     if (report.update % run.checkpoint_every == 0 || trainer.finished() || interrupted() != 0)
-      save_checkpoint(folder, trainer, best_return);
+      checkpoint.save(trainer, best_return);
   }
   if (!trainer.learns_by_interaction() && interrupted() == 0) evaluate_now();
   log.finish();

@@ -1,4 +1,5 @@
-// A training run and its folder: config.toml, progress.csv, event files, checkpoints/, policies, summary.json.
+// A training run and its folder: config.toml, progress.csv, event files, checkpoints/, policies,
+// summary.json.
 #pragma once
 
 #include <filesystem>
@@ -10,14 +11,16 @@
 namespace agail {
 
 struct RunOutcome {
-  int signal = 0;                   // that interrupted it, after a checkpoint was saved; 0: done
+  int signal = 0;  // that interrupted it, after a checkpoint was saved; 0: done
   std::int64_t timesteps = 0;
-  std::optional<Evaluation> best;   // trpo: of policy_best
-  std::optional<Evaluation> last;   // the last evaluation
+  std::optional<Evaluation> cloned;  // of the start, where the policy starts cloned
+  std::optional<Evaluation> best;    // trpo: of policy_best
+  std::optional<Evaluation> last;    // the last evaluation
 };
 
-// Trains in `folder`. Without `resume` the folder must not hold a run; with it, the run goes on from its checkpoint (from
-// the start, if it was cut off before the first), to the same policy as if it had never stopped.
+// Trains in `folder`. Without `resume` the folder must not hold a run; with it, the run goes on
+// from its checkpoint (from the start, if it was cut off before the first), to the same policy as
+// if it had never stopped.
 RunOutcome run_training(TrainingTask task, const std::filesystem::path& folder, bool resume);
 
 }  // namespace agail

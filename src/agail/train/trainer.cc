@@ -111,7 +111,11 @@ void Trainer::start() {
   if (clones) {
     cloning_ = clone_policy(network_, normalizer_, *demos_, targets, settings.bc, !adversarial,
                             pool_, task_.seed, theta_);
-    value_warmup_ = adversarial ? settings.start.value_warmup : 0;
+    if (adversarial) {
+      theta_.tail(network_.distribution.log_stds())
+          .setConstant(static_cast<float>(settings.start.log_std));
+      value_warmup_ = settings.start.value_warmup;
+    }
   }
   if (adversarial && settings.clone.weight > 0)
     cloning_term_ = std::make_unique<CloningTerm>(

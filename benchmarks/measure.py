@@ -1,0 +1,232 @@
+#!/usr/bin/env python3
+"""Trains and evaluates what docs/results.md reports, and writes results/<experiment>.csv.
+
+    benchmarks/measure.py trpo         TRPO on the true reward, preset default, seeds 0-4
+    benchmarks/measure.py imitation    agail and what it is compared with, 75 % of the actions missing, seeds 0-4
+    benchmarks/measure.py ablation     agail with one part off at a time, seeds 0-4
+
+Runs go to --work (default runs/measure), --jobs at a time with one thread each; finished runs are kept, interrupted
+ones resumed, so the command can be repeated until it is through. Results do not depend on --jobs.
+The experts of `imitation` and `ablation` are the best TRPO runs of `trpo`, which must be there.
+"""
+
+import argparse
+import csv
+import json
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from statistics import mean, stdev
+
+ROOT = Path(__file__).resolve().parent.parent
+AGAIL = Path(os.environ.get("AGAIL", ROOT / "build/release/agail"))
+SEEDS = range(5)
+EPISODES = 50
+MISSING = 0.75
+TRPO_ENVIRONMENTS = ["CartPole-v0", "Hopper-v5", "Walker2d-v5", "Humanoid-v4"]
+STEPS = {"Hopper-v5": 100_000, "Walker2d-v5": 150_000}
+TRAJECTORIES = [10, 3]
+OFF = {
+    "full": [],
+    "no discriminator": ["reward.alpha=0"],
+    "no guide": ["reward.beta=0"],
+    "no warm start": ["start.method=random"],
+    "no inferred actions": ["start.method=clone"],
+    "no cloning term": ["clone.weight=0"],
+}
+
+
+def agail(*arguments: object) -> str:
+    command = [str(AGAIL), *map(str, arguments)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit(f"failed ({done.returncode}): {' '.join(command)}")
+    return done.stdout
+
+
+def train(run: Path, environment: str, method: str, seed: int, *options: object) -> None:
+    summary = run / "summary.json"
+    if summary.exists() and json.loads(summary.read_text())["finished"]:
+        return
+    run.parent.mkdir(parents=True, exist_ok=True)
+    resume = ["--resume"] if (run / "config.toml").exists() else []
+    agail(
+        "train",
+        environment,
+        "--method",
+        method,
+        "--seed",
+        seed,
+        "--threads",
+        1,
+        "--out",
+        run,
+        *options,
+        *resume,
+    )
+
+
+def evaluate(run: Path) -> dict:
+    file = run / "evaluation.json"
+    if not file.exists():
+        file.write_text(agail("eval", run, "--episodes", EPISODES, "--seed", 1000, "--json"))
+    return json.loads(file.read_text())
+
+
+def curve(run: Path) -> list[tuple[int, float]]:
+    """(timesteps, deterministic return) of the evaluations during training; at 0 that of a cloned start."""
+    summary = json.loads((run / "summary.json").read_text())
+    points = (
+        [(0, summary["cloned_evaluation"]["mean_return"])] if "cloned_evaluation" in summary else []
+    )
+    with (run / "progress.csv").open() as file:
+        for row in csv.DictReader(file):
+            if row["eval/mean_reward"]:
+                points.append(
+                    (int(float(row["time/total_timesteps"])), float(row["eval/mean_reward"]))
+                )
+    return points
+
+
+def write(name: str, rows: list[dict]) -> None:
+    path = ROOT / "results" / f"{name}.csv"
+    path.parent.mkdir(exist_ok=True)
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"{path.relative_to(ROOT)} written")
+
+
+def in_parallel(jobs: int, tasks: list) -> list:
+    with ThreadPoolExecutor(jobs) as executor:
+        return list(executor.map(lambda task: task(), tasks))
+
+
+def measure_trpo(work: Path, jobs: int) -> None:
+    def one(environment: str, seed: int) -> dict:
+        run = work / "trpo" / environment / str(seed)
+        train(run, environment, "trpo", seed)
+        result = evaluate(run)
+        summary = json.loads((run / "summary.json").read_text())
+        return {
+            "environment": environment,
+            "seed": seed,
+            "timesteps": summary["timesteps"],
+            "mean_return": round(result["mean_return"], 2),
+            "standard_error": round(result["standard_error"], 2),
+            "mean_length": round(result["mean_length"], 1),
+            "seconds": round(summary["wall_seconds"], 1),
+        }
+
+    # The longest first.
+    tasks = [(e, s) for e in reversed(TRPO_ENVIRONMENTS) for s in SEEDS]
+    rows = in_parallel(jobs, [lambda t=t: one(*t) for t in tasks])
+    rows.sort(key=lambda row: (TRPO_ENVIRONMENTS.index(row["environment"]), row["seed"]))
+    write("trpo", rows)
+    for environment in TRPO_ENVIRONMENTS:
+        returns = [row["mean_return"] for row in rows if row["environment"] == environment]
+        print(
+            f"| {environment} | {mean(returns):.1f} | {stdev(returns):.1f} | {min(returns):.1f} |"
+        )
+
+
+def demonstrations(work: Path, environment: str, trajectories: int) -> Path:
+    """Of the mean action of the best TRPO run, three quarters of the single actions removed."""
+    runs = [work / "trpo" / environment / str(seed) for seed in SEEDS]
+    expert = max(runs, key=lambda run: evaluate(run)["mean_return"])
+    masked = work / "demonstrations" / f"{environment}-{trajectories}.hdf5"
+    if not masked.exists():
+        masked.parent.mkdir(parents=True, exist_ok=True)
+        whole = masked.with_name(f"{environment}-{trajectories}-whole.hdf5")
+        agail("record", expert, "--episodes", trajectories, "--out", whole)
+        agail("mask", whole, "--missing", MISSING, "--out", masked)
+    return masked
+
+
+def imitate(
+    run: Path, environment: str, method: str, seed: int, demos: Path, assignments: list[str]
+) -> dict:
+    options = ["--demos", demos, "--timesteps", STEPS[environment], "--set", "run.evaluate_every=5"]
+    for assignment in assignments:
+        options += ["--set", assignment]
+    train(run, environment, method, seed, *options)
+    result = evaluate(run)
+    demonstrated = json.loads((run / "summary.json").read_text())["demonstrations"]["mean_return"]
+    reached = [steps for steps, value in curve(run) if value >= 0.95 * demonstrated]
+    return {
+        "share_of_demonstrations": round(result["share_of_demonstrations"], 4),
+        "mean_return": round(result["mean_return"], 2),
+        "standard_error": round(result["standard_error"], 2),
+        "steps_to_95": reached[0] if reached else "",
+        "demonstrations_mean_return": round(demonstrated, 2),
+    }
+
+
+def measure_imitation(
+    work: Path, jobs: int, name: str, variants: dict[str, tuple[str, list[str]]]
+) -> None:
+    def one(environment: str, trajectories: int, variant: str, seed: int) -> dict:
+        method, assignments = variants[variant]
+        run = work / name / environment / str(trajectories) / variant.replace(" ", "-") / str(seed)
+        demos = demonstrations(work, environment, trajectories)
+        head = {
+            "environment": environment,
+            "trajectories": trajectories,
+            "variant": variant,
+            "seed": seed,
+        }
+        return head | imitate(run, environment, method, seed, demos, assignments)
+
+    for environment in STEPS:
+        for trajectories in TRAJECTORIES:
+            demonstrations(work, environment, trajectories)
+    tasks = [
+        (e, n, v, s) for e in reversed(STEPS) for n in TRAJECTORIES for v in variants for s in SEEDS
+    ]
+    rows = in_parallel(jobs, [lambda t=t: one(*t) for t in tasks])
+    write(name, rows)
+    print("| environment | trajectories | variant | share | worst | to 95 % (median, seeds) |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for key in dict.fromkeys((r["environment"], r["trajectories"], r["variant"]) for r in rows):
+        group = [r for r in rows if (r["environment"], r["trajectories"], r["variant"]) == key]
+        shares = [r["share_of_demonstrations"] for r in group]
+        reached = sorted(r["steps_to_95"] for r in group if r["steps_to_95"] != "")
+        to_95 = (
+            f"{reached[(len(reached) - 1) // 2]:,} ({len(reached)} of {len(group)})"
+            if reached
+            else "never"
+        )
+        print(
+            f"| {key[0]} | {key[1]} | {key[2]} | {mean(shares):.3f} | {min(shares):.3f} | {to_95} |"
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("experiment", choices=["trpo", "imitation", "ablation"])
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--work", type=Path, default=ROOT / "runs/measure")
+    options = parser.parse_args()
+    if options.experiment == "trpo":
+        measure_trpo(options.work, options.jobs)
+    elif options.experiment == "imitation":
+        methods = {
+            "agail": ("agail", []),
+            "gail": ("gail", []),
+            "state-gail": ("state-gail", []),
+            "bc": ("bc", []),
+        }
+        measure_imitation(options.work, options.jobs, "imitation", methods)
+    else:
+        measure_imitation(
+            options.work, options.jobs, "ablation", {v: ("agail", s) for v, s in OFF.items()}
+        )
+
+
+if __name__ == "__main__":
+    main()
