@@ -225,15 +225,17 @@ def test_interrupted_and_resumed(agail, small, tmp_path, task, number):
 
 def kill_and_resume(agail, small, tmp_path, task, kills, timesteps, seed):
     reference, run = tmp_path / "reference", tmp_path / "run"
-    begin = time.monotonic()
     agail(*train(small, task, reference, timesteps))
-    span = time.monotonic() - begin
     moments = random.Random(seed)
-    for _ in range(kills):
+    stride = timesteps // 256 // (kills + 1)
+    for kill in range(kills):
         process = agail.start(*train(small, task, run, timesteps, "--resume"))
-        time.sleep(moments.uniform(0, 1.2 * span / max(1, kills / 4)))
+        if kill % 4 != 3:
+            before = len(progress(run)) if (run / "progress.csv").exists() else 0
+            wait_for_rows(process, run, before + moments.randint(1, stride))
+        time.sleep(moments.uniform(0, 0.02))
         process.kill()
-        process.wait()
+        assert process.wait() == -signal.SIGKILL, "it ended before it was killed"
     agail(*train(small, task, run, timesteps, "--resume"))
     assert_same_result(run, reference)
     assert_tensorboard_agrees(run)
