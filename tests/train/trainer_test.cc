@@ -1,0 +1,145 @@
+#include "agail/train/trainer.h"
+
+#include <gtest/gtest.h>
+
+#include "imitation/support.h"
+
+namespace agail {
+namespace {
+
+TrainingTask task(const std::string& environment, const std::string& method, int threads = 1) {
+  TrainingTask result;
+  result.environment = environment;
+  result.method = method;
+  result.seed = 3;
+  result.threads = threads;
+  Settings& s = result.settings;
+  s.run.batch_steps = 300;
+  s.run.lanes = 3;
+  s.policy.hidden = {16};
+  s.value.hidden = {16};
+  s.value.normalize_targets = true;
+  s.discriminator.hidden = {16};
+  s.discriminator.minibatches = 3;
+  s.discriminator.minibatch = 100;
+  s.discriminator.every = 2;
+  s.discriminator.gradient_penalty = 0.1;
+  s.guide.hidden = 8;
+  s.reward.centring = 1;
+  s.bc.epochs = 3;
+  s.inverse_dynamics.epochs = 3;
+  s.inverse_dynamics.hidden = {16};
+  return result;
+}
+
+Demonstrations masked(const std::string& environment, double ratio) {
+  Demonstrations demos = random_demonstrations(environment, 15, 3);
+  remove_actions(demos,
+                 {.pattern = MaskPattern::kStep, .ratio = ratio, .seed = 4, .dimension = {}});
+  return demos;
+}
+
+struct Trained {
+  TensorStore policy, state;
+};
+
+Trained train(TrainingTask t, int updates = 4) {
+  Trainer trainer(std::move(t));
+  for (int i = 0; i < updates && trainer.learns_by_interaction(); ++i) {
+    const UpdateReport report = trainer.update();
+    EXPECT_TRUE(!report.trpo || report.trpo->accepted);
+  }
+  return {trainer.policy().store(), archived(trainer)};
+}
+
+// Equal but for the method's name.
+bool same(const Trained& a, const Trained& b) {
+  TensorStore x = a.policy, y = b.policy;
+  EXPECT_FALSE(x.tensors.empty());
+  for (TensorStore* store : {&x, &y}) {
+    EXPECT_EQ(store->metadata.count("method"), 1U);
+    store->metadata.erase("method");
+  }
+  return same_store(x, y) && same_store(a.state, b.state);
+}
+
+class TrainerTest : public testing::TestWithParam<std::string> {};
+
+TEST_P(TrainerTest, WithAllActionsMissingAgailIsStateGail) {
+  for (const std::string start : {"random", "clone-inferred"}) {
+    TrainingTask agail = task(GetParam(), "agail"), state_gail = task(GetParam(), "state-gail");
+    agail.settings.start.method = state_gail.settings.start.method = start;
+    agail.settings.clone.weight = state_gail.settings.clone.weight = start == "random" ? 0 : 0.1;
+    agail.demonstrations = state_gail.demonstrations = masked(GetParam(), 1);
+    EXPECT_TRUE(same(train(agail), train(state_gail)));
+    // And with actions there, state-gail does not see them.
+    state_gail.demonstrations = masked(GetParam(), 0.4);
+    EXPECT_TRUE(same(train(agail), train(state_gail)));
+    agail.demonstrations = masked(GetParam(), 0.4);
+    EXPECT_FALSE(same(train(agail), train(state_gail)));
+  }
+}
+
+TEST_P(TrainerTest, MissingActionsAreNeverRead) {
+  for (const std::string method : {"agail", "gail", "bc"}) {
+    std::vector<Trained> runs;
+    for (const double poison : kPoison) {
+      TrainingTask t = task(GetParam(), method);
+      t.settings.start.method = "clone-inferred";
+      t.settings.clone.weight = 0.1;
+      t.demonstrations = masked(GetParam(), 0.5);
+      fill_missing(*t.demonstrations, poison);
+      runs.push_back(train(std::move(t), 2));
+      EXPECT_TRUE(same(runs.back(), runs.front())) << method << " with " << poison;
+    }
+  }
+}
+
+TEST_P(TrainerTest, SameBitsForAnyNumberOfThreads) {
+  for (const std::string method : {"agail", "trpo"}) {
+    std::vector<Trained> runs;
+    for (const int threads : {1, 2, 3}) {
+      TrainingTask t = task(GetParam(), method, threads);
+      t.settings.start.method = "clone";
+      if (method == "agail") t.demonstrations = masked(GetParam(), 0.5);
+      runs.push_back(train(std::move(t)));
+      EXPECT_TRUE(same(runs.back(), runs.front())) << threads;
+    }
+  }
+}
+
+TEST_P(TrainerTest, ContinuesFromAnArchive) {
+  for (const std::string method : {"agail", "gail", "trpo"}) {
+    TrainingTask t = task(GetParam(), method);
+    t.settings.start.method = "clone-inferred";
+    t.settings.start.value_warmup = 1;
+    t.settings.clone.weight = 0.1;
+    t.settings.clone.decay = 0.9;
+    if (method != "trpo") t.demonstrations = masked(GetParam(), 0.5);
+    Trainer whole(t);
+    for (int i = 0; i < 3; ++i) whole.update();
+    TensorStore store = archived(whole);
+    Trainer resumed(t);
+    Archive load(store, Archive::Mode::kLoad);
+    resumed.archive(load);
+    EXPECT_TRUE(same_store(archived(resumed), store));
+    for (int i = 0; i < 3; ++i) {
+      const UpdateReport a = whole.update(), b = resumed.update();
+      EXPECT_EQ(a.timesteps, b.timesteps);
+      EXPECT_EQ(a.episodes, b.episodes);
+      EXPECT_EQ(a.episode_return, b.episode_return);
+      EXPECT_EQ(a.trpo->kl, b.trpo->kl);
+      EXPECT_EQ(a.explained_variance, b.explained_variance);
+    }
+    EXPECT_TRUE(same_store(archived(whole), archived(resumed))) << method;
+    EXPECT_TRUE(same_store(whole.policy().store(), resumed.policy().store()));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Environments, TrainerTest, testing::Values("CartPole-v1", "Hopper-v5"),
+                         [](const auto& test) {
+                           return test.param.substr(0, test.param.find('-'));
+                         });
+
+}  // namespace
+}  // namespace agail
