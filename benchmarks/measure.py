@@ -2,8 +2,8 @@
 """Trains and evaluates what docs/results.md reports, and writes results/<experiment>.csv.
 
     benchmarks/measure.py trpo         TRPO on the true reward, preset default, seeds 0-4
-    benchmarks/measure.py imitation    agail and what it is compared with, 75 % of the actions missing, seeds 0-4
-    benchmarks/measure.py ablation     agail with one part off at a time, seeds 0-4
+    benchmarks/measure.py imitation    agail and what it is compared with, 10 demonstrations, 75 % of the actions missing, seeds 0-4
+    benchmarks/measure.py ablation     agail with one part off at a time, 10 and 3 demonstrations, seeds 0-4
 
 Runs go to --work (default runs/measure), --jobs at a time with one thread each; finished runs are kept, interrupted
 ones resumed, so the command can be repeated until it is through. Results do not depend on --jobs.
@@ -26,14 +26,12 @@ SEEDS = range(5)
 EPISODES = 50
 MISSING = 0.75
 TRPO_ENVIRONMENTS = ["CartPole-v0", "Hopper-v5", "Walker2d-v5", "Humanoid-v4"]
-STEPS = {"Hopper-v5": 100_000, "Walker2d-v5": 150_000}
-TRAJECTORIES = [10, 3]
+STEPS = {"Hopper-v5": 60_000, "Walker2d-v5": 100_000}
 OFF = {
     "full": [],
     "no discriminator": ["reward.alpha=0"],
     "no guide": ["reward.beta=0"],
     "no warm start": ["start.method=random"],
-    "no inferred actions": ["start.method=clone"],
     "no cloning term": ["clone.weight=0"],
 }
 
@@ -88,6 +86,10 @@ def curve(run: Path) -> list[tuple[int, float]]:
                     (int(float(row["time/total_timesteps"])), float(row["eval/mean_reward"]))
                 )
     return points
+
+
+def demonstrated_return(run: Path) -> float:
+    return json.loads((run / "summary.json").read_text())["demonstrations"]["mean_return"]
 
 
 def write(name: str, rows: list[dict]) -> None:
@@ -150,11 +152,12 @@ def imitate(
     run: Path, environment: str, method: str, seed: int, demos: Path, assignments: list[str]
 ) -> dict:
     options = ["--demos", demos, "--timesteps", STEPS[environment], "--set", "run.evaluate_every=5"]
+    options += ["--set", "run.evaluation_episodes=5"]
     for assignment in assignments:
         options += ["--set", assignment]
     train(run, environment, method, seed, *options)
     result = evaluate(run)
-    demonstrated = json.loads((run / "summary.json").read_text())["demonstrations"]["mean_return"]
+    demonstrated = demonstrated_return(run)
     reached = [steps for steps, value in curve(run) if value >= 0.95 * demonstrated]
     return {
         "share_of_demonstrations": round(result["share_of_demonstrations"], 4),
@@ -168,23 +171,27 @@ def imitate(
 def measure_imitation(
     work: Path, jobs: int, name: str, variants: dict[str, tuple[str, list[str]]]
 ) -> None:
-    def one(environment: str, trajectories: int, variant: str, seed: int) -> dict:
+    def one(environment: str, n: int, variant: str, seed: int) -> dict:
         method, assignments = variants[variant]
-        run = work / name / environment / str(trajectories) / variant.replace(" ", "-") / str(seed)
-        demos = demonstrations(work, environment, trajectories)
+        # The full method is the same run in both experiments.
+        folder, leaf = (
+            ("imitation", "agail") if variant == "full" else (name, variant.replace(" ", "-"))
+        )
+        run = work / folder / environment / str(n) / leaf / str(seed)
+        demos = demonstrations(work, environment, n)
         head = {
             "environment": environment,
-            "trajectories": trajectories,
+            "trajectories": n,
             "variant": variant,
             "seed": seed,
         }
         return head | imitate(run, environment, method, seed, demos, assignments)
 
     for environment in STEPS:
-        for trajectories in TRAJECTORIES:
-            demonstrations(work, environment, trajectories)
+        for n in trajectories:
+            demonstrations(work, environment, n)
     tasks = [
-        (e, n, v, s) for e in reversed(STEPS) for n in TRAJECTORIES for v in variants for s in SEEDS
+        (e, n, v, s) for e in reversed(STEPS) for n in trajectories for v in variants for s in SEEDS
     ]
     rows = in_parallel(jobs, [lambda t=t: one(*t) for t in tasks])
     write(name, rows)
@@ -221,10 +228,14 @@ def main() -> None:
             "state-gail": ("state-gail", []),
             "bc": ("bc", []),
         }
-        measure_imitation(options.work, options.jobs, "imitation", methods)
+        measure_imitation(options.work, options.jobs, "imitation", [10], methods)
     else:
         measure_imitation(
-            options.work, options.jobs, "ablation", {v: ("agail", s) for v, s in OFF.items()}
+            options.work,
+            options.jobs,
+            "ablation",
+            [10, 3],
+            {v: ("agail", s) for v, s in OFF.items()},
         )
 
 
