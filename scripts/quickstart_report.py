@@ -11,6 +11,7 @@ METHODS = {  # folder: what it learned from
     "agail": "the states and the actions that are there",
 }
 CURVES = {"state-gail": "o", "agail": "#"}
+BOTH = "@"
 WIDTH, HEIGHT = 70, 16
 
 Curve = list[tuple[float, float]]
@@ -59,8 +60,10 @@ def plot(curves: dict[str, Curve], level: float) -> None:
             first, last = (round(x / right * (WIDTH - 1)) for x in (x0, x1))
             for column in range(first, last + 1):
                 share = (column - first) / max(last - first, 1)
-                canvas[line_of(y0 + share * (y1 - y0))][column] = CURVES[name]
-    key = "   ".join([*(f"{CURVES[name]} {name}" for name in curves), ". demonstrations"])
+                row, mark = canvas[line_of(y0 + share * (y1 - y0))], CURVES[name]
+                row[column] = mark if row[column] in (" ", ".", mark) else BOTH
+    marks = [*(f"{CURVES[name]} {name}" for name in curves), f"{BOTH} both", ". demonstrations"]
+    key = "   ".join(marks)
     print(f"\nReturn over steps of training (evaluated without noise):   {key}\n")
     for line, row in enumerate(canvas):
         labelled = line in (0, line_of(level), HEIGHT - 1)
