@@ -169,7 +169,11 @@ def imitate(
 
 
 def measure_imitation(
-    work: Path, jobs: int, name: str, variants: dict[str, tuple[str, list[str]]]
+    work: Path,
+    jobs: int,
+    name: str,
+    trajectories: list[int],
+    variants: dict[str, tuple[str, list[str]]],
 ) -> None:
     def one(environment: str, n: int, variant: str, seed: int) -> dict:
         method, assignments = variants[variant]
