@@ -26,7 +26,7 @@ SEEDS = range(5)
 EPISODES = 50
 MISSING = 0.75
 TRPO_ENVIRONMENTS = ["CartPole-v0", "Hopper-v5", "Walker2d-v5", "Humanoid-v4"]
-STEPS = {"Hopper-v5": 60_000, "Walker2d-v5": 100_000}
+STEPS = {"Hopper-v5": 40_000, "Walker2d-v5": 80_000}
 OFF = {
     "full": [],
     "no discriminator": ["reward.alpha=0"],

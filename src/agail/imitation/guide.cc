@@ -13,7 +13,7 @@ namespace agail {
 namespace {
 
 constexpr Index kHoldOutEvery = 10;  // one available action in ten is kept to measure the guide
-constexpr Index kHeldOutAtMost = 512;
+constexpr Index kHeldOutAtMost = 256;
 constexpr Index kDiagnosticStates = 64;
 constexpr Index kActionsAState = 8;
 // A Gaussian on actions that a deterministic demonstrator gave would narrow without end, and its
@@ -108,6 +108,7 @@ Guide::Guide(const DemoData& demos, const ActionSpace& action, const GuideSettin
       gradient_(Vector<float>::Zero(network_.parameters())),
       sampled_(static_cast<std::size_t>(action.dim)),
       executed_(sampled_),
+      drawn_(static_cast<std::size_t>(minibatch)),
       fresh_actions_(Matrix<float>::Zero(action.dim, kDiagnosticStates * kActionsAState)) {
   AGAIL_CHECK(!demos.some_action.empty());
   RandomStream random(seed, Purpose::kInitialise, 3);
@@ -130,16 +131,25 @@ Guide::Guide(const DemoData& demos, const ActionSpace& action, const GuideSettin
 
 Guide::~Guide() = default;
 
-void Guide::act(const PolicyView& policy, const float* state, RandomStream& random,
-                float* executed) {
+void Guide::show_policy(const PolicyView& policy, const float* state, Index slot) {
   if (policy_input_.size() == 0) {
-    policy_input_.setZero(padded(policy.network.mlp.inputs() + 1), 1);
-    policy_tape_ = policy.network.mlp.make_tape(1);
+    const Index slots = std::max({minibatch_, kHeldOutAtMost, kDiagnosticStates});
+    policy_input_.setZero(padded(policy.network.mlp.inputs() + 1), slots);
+    policy_tape_ = policy.network.mlp.make_tape(slots);
   }
-  policy.normalizer.apply(state, policy_input_.data());
-  policy.network.mlp.forward(
-      policy.theta.data(), policy_input_.topRows(policy.network.mlp.inputs() + 1), policy_tape_, 0);
-  policy.network.distribution.sample(policy_tape_.outputs.back().data(),
+  policy.normalizer.apply(state, policy_input_.col(slot).data());
+}
+
+void Guide::run_policy(const PolicyView& policy, Index slots) {
+  const Mlp<float>& mlp = policy.network.mlp;
+  for_each_chunk(pool_, slots, [&](int, Index first, Index count) {
+    mlp.forward(policy.theta.data(), policy_input_.block(0, first, mlp.inputs() + 1, count),
+                policy_tape_, first);
+  });
+}
+
+void Guide::act(const PolicyView& policy, Index slot, RandomStream& random, float* executed) {
+  policy.network.distribution.sample(policy_tape_.outputs.back().col(slot).data(),
                                      policy.network.log_std(policy.theta.data()), random,
                                      sampled_.data());
   clip_action(action_, sampled_.data(), executed);
@@ -157,9 +167,14 @@ GuideReport Guide::learn(const PolicyView& policy, Index minibatches, std::uint3
   for (Index step = 0; step < minibatches; ++step) {
     for (Index j = 0; j < minibatch_; ++j) {
       const Index column = training_[random.below(static_cast<std::uint32_t>(training_.size()))];
-      const float* state = demos_.states.col(column).data();
-      if (sees_action()) act(policy, state, random, executed_.data());
-      build_input(state, executed_.data(), x_.col(j).data());
+      drawn_[static_cast<std::size_t>(j)] = column;
+      if (sees_action()) show_policy(policy, demos_.states.col(column).data(), j);
+    }
+    if (sees_action()) run_policy(policy, minibatch_);
+    for (Index j = 0; j < minibatch_; ++j) {
+      const Index column = drawn_[static_cast<std::size_t>(j)];
+      if (sees_action()) act(policy, j, random, executed_.data());
+      build_input(demos_.states.col(column).data(), executed_.data(), x_.col(j).data());
       targets_.col(j) = demos_.actions.col(column);
       available_.col(j) = demos_.available.col(column);
     }
@@ -223,51 +238,61 @@ void Guide::rewards(const Matrix<float>& states, const Matrix<float>& actions, I
 void Guide::diagnose(const PolicyView& policy, const Matrix<float>& states, Index n,
                      std::uint32_t update, GuideReport& report) {
   RandomStream random(seed_, Purpose::kDiagnostics, 0, update);
-  const auto forward = [&](Index columns) {
-    for (Index first = 0; first < columns; first += kChunk)
-      network_.mlp.forward(
-          theta_.data(),
-          reward_x_.block(0, first, network_.mlp.inputs() + 1, std::min(kChunk, columns - first)),
-          tape_, first);
-  };
+  report.held_out_log_likelihood = held_out_log_likelihood(policy, random);
+  report.action_variance_share = action_variance_share(policy, states, n, random);
+}
 
-  // E log Q on held-out available actions.
+void Guide::run_guide(Index columns) {
+  for_each_chunk(pool_, columns, [&](int, Index first, Index count) {
+    network_.mlp.forward(theta_.data(), reward_x_.block(0, first, network_.mlp.inputs() + 1, count),
+                         tape_, first);
+  });
+}
+
+// E log Q on held-out available actions.
+double Guide::held_out_log_likelihood(const PolicyView& policy, RandomStream& random) {
   const auto held = static_cast<Index>(held_out_.size());
-  for (Index j = 0; j < held; ++j) {
-    const float* state = demos_.states.col(held_out_[static_cast<std::size_t>(j)]).data();
-    if (sees_action()) act(policy, state, random, executed_.data());
-    build_input(state, executed_.data(), reward_x_.col(j).data());
+  if (held == 0) return std::numeric_limits<double>::quiet_NaN();
+  const auto column = [&](Index j) { return held_out_[static_cast<std::size_t>(j)]; };
+  if (sees_action()) {
+    for (Index j = 0; j < held; ++j) show_policy(policy, demos_.states.col(column(j)).data(), j);
+    run_policy(policy, held);
   }
-  forward(held);
-  double log_likelihood = 0;
   for (Index j = 0; j < held; ++j) {
-    const Index column = held_out_[static_cast<std::size_t>(j)];
-    const ConstView<float> mask = demos_.available.middleCols(column, 1);
+    if (sees_action()) act(policy, j, random, executed_.data());
+    build_input(demos_.states.col(column(j)).data(), executed_.data(), reward_x_.col(j).data());
+  }
+  run_guide(held);
+  double sum = 0;
+  for (Index j = 0; j < held; ++j) {
+    const ConstView<float> mask = demos_.available.middleCols(column(j), 1);
     Eigen::Matrix<float, 1, 1> log_q;
     network_.distribution.log_prob(tape_.outputs.back().block(0, j, network_.mlp.outputs(), 1),
                                    network_.log_std(theta_.data()),
-                                   demos_.actions.middleCols(column, 1), &mask, log_q);
-    log_likelihood += static_cast<double>(log_q[0]);
+                                   demos_.actions.middleCols(column(j), 1), &mask, log_q);
+    sum += static_cast<double>(log_q[0]);
   }
-  report.held_out_log_likelihood = held > 0 ? log_likelihood / static_cast<double>(held)
-                                            : std::numeric_limits<double>::quiet_NaN();
+  return sum / static_cast<double>(held);
+}
 
-  // Var(r_Q) = Var_s(E_a r) + E_s(Var_a r): the share of the second, over fresh actions at fixed
-  // states.
+// Var(r_Q) = Var_s(E_a r) + E_s(Var_a r): the share of the second, over fresh actions at fixed
+// states.
+double Guide::action_variance_share(const PolicyView& policy, const Matrix<float>& states, Index n,
+                                    RandomStream& random) {
   const Index count = std::min(kDiagnosticStates, n);
-  for (Index s = 0; s < count; ++s) {
-    const Index from = s * n / count;
+  const auto state = [&](Index s) { return states.col(s * n / count).data(); };
+  for (Index s = 0; s < count; ++s) show_policy(policy, state(s), s);
+  run_policy(policy, count);
+  for (Index s = 0; s < count; ++s)
     for (Index k = 0; k < kActionsAState; ++k) {
       const Index j = s * kActionsAState + k;
-      act(policy, states.col(from).data(), random, fresh_actions_.col(j).data());
-      build_input(states.col(from).data(), fresh_actions_.col(j).data(), reward_x_.col(j).data());
+      act(policy, s, random, fresh_actions_.col(j).data());
+      build_input(state(s), fresh_actions_.col(j).data(), reward_x_.col(j).data());
     }
-  }
-  forward(count * kActionsAState);
+  run_guide(count * kActionsAState);
   double within = 0, sum = 0, squares = 0;
   for (Index s = 0; s < count; ++s) {
-    const float* state = states.col(s * n / count).data();
-    const Index column = sees_action() ? target_column(state, random) : 0;
+    const Index column = sees_action() ? target_column(state(s), random) : 0;
     double state_sum = 0, state_squares = 0;
     for (Index k = 0; k < kActionsAState; ++k) {
       const Index j = s * kActionsAState + k;
@@ -284,7 +309,7 @@ void Guide::diagnose(const PolicyView& policy, const Matrix<float>& states, Inde
     squares += state_squares;
   }
   const double total = squares - sum * sum / static_cast<double>(count * kActionsAState);
-  report.action_variance_share = total > 0 ? std::clamp(within / total, 0.0, 1.0) : 0;
+  return total > 0 ? std::clamp(within / total, 0.0, 1.0) : 0;
 }
 
 void Guide::archive(Archive& a) {

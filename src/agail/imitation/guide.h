@@ -91,7 +91,16 @@ class Guide {
 
  private:
   bool sees_action() const { return settings_.target != "own"; }
-  void act(const PolicyView& policy, const float* state, RandomStream& random, float* executed);
+  // What the policy does at states: put into slots, run through its network together, then sampled
+  // one by one.
+  void show_policy(const PolicyView& policy, const float* state, Index slot);
+  void run_policy(const PolicyView& policy, Index slots);
+  void act(const PolicyView& policy, Index slot, RandomStream& random, float* executed);
+  // Q's outputs for the first columns of reward_x_, into tape_.
+  void run_guide(Index columns);
+  double held_out_log_likelihood(const PolicyView& policy, RandomStream& random);
+  double action_variance_share(const PolicyView& policy, const Matrix<float>& states, Index n,
+                               RandomStream& random);
   void build_input(const float* state, const float* action, float* x) const;
   // The demonstrated action that the reward asks about: nearest, or random.
   Index target_column(const float* state, RandomStream& random) const;
@@ -118,6 +127,7 @@ class Guide {
   Matrix<float> policy_input_, x_, targets_, available_, reward_x_;
   Vector<float> gradient_;
   std::vector<float> sampled_, executed_;
+  std::vector<Index> drawn_;
   Matrix<float> fresh_actions_;
 };
 
