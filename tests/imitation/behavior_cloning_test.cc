@@ -87,7 +87,7 @@ TEST(CloningTerm, ValueAndGradientOfTheWeightedLogLikelihood) {
     Vector<float> theta = reference::normal_vector(network.parameters(), 3, 0.5).cast<float>();
     // All draws are of the one column given.
     for (const Index column : {Index{0}, Index{1}, Index{3}}) {
-      ThreadPool pool(2);
+      ThreadPool pool(1);
       CloneSettings settings;
       settings.weight = 0.8;
       settings.decay = 0.5;

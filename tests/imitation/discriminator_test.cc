@@ -69,7 +69,7 @@ class DiscriminatorLossTest : public testing::TestWithParam<Case> {
 };
 
 TEST_P(DiscriminatorLossTest, GradientAndReport) {
-  ThreadPool pool(2);
+  ThreadPool pool(1);
   DiscriminatorLoss<double> loss_object(mlp_, settings_, pool);
   Vector<double> gradient = Vector<double>::Zero(mlp_.parameters());
   const DiscriminatorReport report = loss_object.gradient(theta_, x_, between_, gradient);

@@ -64,9 +64,9 @@ class GuideNetworkTest : public testing::TestWithParam<Case> {
 };
 
 TEST_P(GuideNetworkTest, LossAndGradient) {
-  ThreadPool pool(2);
+  ThreadPool pool(1);
   ChunkSums<double> sums(network_.parameters() + 1, kSamples);
-  std::vector<Scratch<double>> scratch{network_.mlp.make_scratch(), network_.mlp.make_scratch()};
+  std::vector<Scratch<double>> scratch{network_.mlp.make_scratch()};
   Tape<double> tape = network_.mlp.make_tape(kSamples);
   const auto loss = [&](const Vector<double>& theta, Vector<double>& gradient) {
     return network_.loss(pool, sums, scratch, theta, x_, targets_, available_, kSamples, tape,

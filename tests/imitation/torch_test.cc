@@ -34,7 +34,9 @@ Matrix<double> matrix(const json& values, Index rows, bool ones) {
 
 TEST(Torch, SurrogateGradientAndFisherVectorProduct) {
   ThreadPool pool(1);
-  for (const json& data : fixture().at("policies")) {
+  const json file = fixture();
+  ASSERT_EQ(file.at("policies").size(), 2U);
+  for (const json& data : file.at("policies")) {
     const auto sizes = data.at("sizes").get<std::vector<int>>();
     const bool discrete = data.at("discrete").get<bool>();
     const ActionSpace space =

@@ -66,7 +66,7 @@ class PolicyObjectiveTest : public testing::TestWithParam<bool> {
 };
 
 TEST_P(PolicyObjectiveTest, ValuesEqualTheReference) {
-  ThreadPool pool(2);
+  ThreadPool pool(1);
   PolicyObjective<double> objective(network_, pool, kSamples + 50, 1);
   objective.bind(theta_, x_, actions_, advantages_, kSamples, 0.3);
   const Vector<double> other = theta_ + reference::normal_vector(network_.parameters(), 5, 0.1);
@@ -79,7 +79,7 @@ TEST_P(PolicyObjectiveTest, ValuesEqualTheReference) {
 }
 
 TEST_P(PolicyObjectiveTest, GradientOfTheSurrogate) {
-  ThreadPool pool(2);
+  ThreadPool pool(1);
   for (const double entropy_weight : {0.0, 0.3}) {
     PolicyObjective<double> objective(network_, pool, kSamples, 5);
     objective.bind(theta_, x_, actions_, advantages_, kSamples, entropy_weight);
@@ -94,7 +94,7 @@ TEST_P(PolicyObjectiveTest, GradientOfTheSurrogate) {
 }
 
 TEST_P(PolicyObjectiveTest, FisherVectorProductIsTheHessianOfTheKl) {
-  ThreadPool pool(2);
+  ThreadPool pool(1);
   const Vector<double> v = reference::normal_vector(network_.parameters(), 6);
   for (const int stride : {1, 4}) {
     PolicyObjective<double> objective(network_, pool, kSamples, stride);

@@ -46,7 +46,7 @@ class TrpoTest : public testing::TestWithParam<bool> {
   Matrix<float> x_, actions_;
   Vector<float> advantages_;
   double mean_ = 0;  // reward
-  ThreadPool pool_{2};
+  ThreadPool pool_{1};
   Stopwatch stopwatch_;
 };
 
