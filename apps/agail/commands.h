@@ -1,5 +1,5 @@
-// The sub-commands, one file each. Each adds itself to the application; its callback does the work, prints
-// results to stdout and throws InputError (exit 2) or anything else (exit 1).
+// The sub-commands, one file each. Each adds itself to the application; its callback does the work,
+// prints results to stdout and throws InputError (exit 2) or anything else (exit 1).
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -29,7 +29,8 @@ struct TensorStore {
 
 // Walks an object's state in one function that serves both directions:
 //   void Adam::archive(Archive& a) { a("first_moment", first_); a("step", step_); }
-// When loading, a missing name, another dtype or another size is an InputError that names the array.
+// When loading, a missing name, another dtype or another size is an InputError that names the
+// array.
 class Archive {
  public:
   enum class Mode { kSave, kLoad };
@@ -38,10 +39,18 @@ class Archive {
   bool loading() const { return mode_ == Mode::kLoad; }
 
   // Arrays of a size that the object already has.
-  void operator()(const std::string& name, std::span<float> values) { transfer(name, values, DType::kF32); }
-  void operator()(const std::string& name, std::span<double> values) { transfer(name, values, DType::kF64); }
-  void operator()(const std::string& name, std::span<std::int64_t> values) { transfer(name, values, DType::kI64); }
-  void operator()(const std::string& name, double& value) { (*this)(name, std::span<double>(&value, 1)); }
+  void operator()(const std::string& name, std::span<float> values) {
+    transfer(name, values, DType::kF32);
+  }
+  void operator()(const std::string& name, std::span<double> values) {
+    transfer(name, values, DType::kF64);
+  }
+  void operator()(const std::string& name, std::span<std::int64_t> values) {
+    transfer(name, values, DType::kI64);
+  }
+  void operator()(const std::string& name, double& value) {
+    (*this)(name, std::span<double>(&value, 1));
+  }
   void operator()(const std::string& name, std::int64_t& value) {
     (*this)(name, std::span<std::int64_t>(&value, 1));
   }
@@ -71,8 +80,9 @@ class Archive {
     } else {
       const Tensor& tensor = find(prefix_ + name, dtype);
       if (tensor.bytes.size() != bytes)
-        throw InputError("array '" + prefix_ + name + "' has " + std::to_string(tensor.bytes.size() / sizeof(T)) +
-                         " values, expected " + std::to_string(values.size()));
+        throw InputError("array '" + prefix_ + name + "' has " +
+                         std::to_string(tensor.bytes.size() / sizeof(T)) + " values, expected " +
+                         std::to_string(values.size()));
       if (bytes > 0) std::memcpy(values.data(), tensor.bytes.data(), bytes);
     }
   }

@@ -9,14 +9,15 @@
 
 namespace agail {
 
-RandomStream::RandomStream(std::uint64_t seed, Purpose purpose, std::uint32_t lane, std::uint32_t episode,
-                           std::uint32_t step)
+RandomStream::RandomStream(std::uint64_t seed, Purpose purpose, std::uint32_t lane,
+                           std::uint32_t episode, std::uint32_t step)
     : key_{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)},
       counter_{static_cast<std::uint32_t>(purpose) << 24, lane, episode, step} {}
 
 std::uint32_t RandomStream::bits() {
   if (used_ == 4) {
-    const r123::Philox4x32::ctr_type counter = {{counter_[0], counter_[1], counter_[2], counter_[3]}};
+    const r123::Philox4x32::ctr_type counter = {
+        {counter_[0], counter_[1], counter_[2], counter_[3]}};
     const r123::Philox4x32::key_type key = {{key_[0], key_[1]}};
     const auto out = r123::Philox4x32{}(counter, key);
     for (unsigned i = 0; i < 4; ++i) block_[i] = out[i];
@@ -52,7 +53,8 @@ std::uint32_t RandomStream::below(std::uint32_t n) {
   std::uint64_t product = static_cast<std::uint64_t>(bits()) * n;
   if (static_cast<std::uint32_t>(product) < n) {
     const std::uint32_t threshold = (0U - n) % n;
-    while (static_cast<std::uint32_t>(product) < threshold) product = static_cast<std::uint64_t>(bits()) * n;
+    while (static_cast<std::uint32_t>(product) < threshold)
+      product = static_cast<std::uint64_t>(bits()) * n;
   }
   return static_cast<std::uint32_t>(product >> 32);
 }

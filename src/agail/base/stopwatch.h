@@ -21,18 +21,21 @@ enum class Phase : std::size_t {
 };
 
 inline constexpr std::array<const char*, static_cast<std::size_t>(Phase::kCount)> kPhaseNames = {
-    "physics",       "inference", "policy_gradient", "conjugate_gradient", "line_search", "value",
-    "discriminator", "guide",     "rest"};
+    "physics",     "inference", "policy_gradient", "conjugate_gradient",
+    "line_search", "value",     "discriminator",   "guide",
+    "rest"};
 
 class Stopwatch {
  public:
   void start(Phase phase) {
     const Clock::time_point now = Clock::now();
-    seconds_[static_cast<std::size_t>(phase_)] += std::chrono::duration<double>(now - since_).count();
+    seconds_[static_cast<std::size_t>(phase_)] +=
+        std::chrono::duration<double>(now - since_).count();
     since_ = now;
     phase_ = phase;
   }
-  // Time measured elsewhere (by several threads, divided by their number) that the current phase must not count.
+  // Time measured elsewhere (by several threads, divided by their number) that the current phase
+  // must not count.
   void move_to(Phase phase, double seconds) {
     seconds_[static_cast<std::size_t>(phase)] += seconds;
     seconds_[static_cast<std::size_t>(phase_)] -= seconds;

@@ -69,7 +69,7 @@ void ThreadPool::run_erased(int tasks, Call call, void* function) {
   }
   take_tasks(0);
   if (!alone)
-    for (int busy; (busy = busy_workers_.load(std::memory_order_acquire)) != 0;)
+    for (int busy = 0; (busy = busy_workers_.load(std::memory_order_acquire)) != 0;)
       wait_while_equal(busy_workers_, busy);
   running_ = false;
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
@@ -85,7 +85,7 @@ void ThreadPool::work(int worker) {
 }
 
 void ThreadPool::take_tasks(int worker) {
-  int task;
+  int task = 0;
   while ((task = next_task_.fetch_add(1, std::memory_order_relaxed)) < tasks_) {
     try {
       call_(function_, task, worker);

@@ -24,7 +24,8 @@ struct StepResult {
   double reward = 0;
   bool terminated = false;  // the task ended: no value beyond this state
   bool truncated = false;   // the time limit ended it: bootstrap from the value of this state
-  bool diverged = false;    // the simulation broke down; also terminated, reward 0, last finite observation kept
+  bool diverged =
+      false;  // the simulation broke down; also terminated, reward 0, last finite observation kept
 };
 
 class Environment {
@@ -37,7 +38,8 @@ class Environment {
   // Starts an episode.
   void reset(RandomStream& random);
 
-  // One step. `action`: spec().action.dim floats (discrete: one, the index), not clipped by us; as in Gymnasium.
+  // One step. `action`: spec().action.dim floats (discrete: one, the index), not clipped by us; as
+  // in Gymnasium.
   StepResult step(std::span<const float> action);
 
   // spec().observation_dim values, of the current state.
@@ -63,7 +65,8 @@ class Environment {
 // Built-in ids, in the order of `agail envs`.
 std::vector<std::string> environment_ids();
 
-// Throws InputError, naming the nearest id, if `id` is unknown. Models are compiled once a process and shared.
+// Throws InputError, naming the nearest id, if `id` is unknown. Models are compiled once a process
+// and shared.
 std::unique_ptr<Environment> make_environment(const std::string& id);
 
 // Version of the physics library, e.g. "4.0.0".
