@@ -7,7 +7,8 @@
 
 Runs go to --work (default runs/measure), --jobs at a time with one thread each; finished runs are kept, interrupted
 ones resumed, so the command can be repeated until it is through. Results do not depend on --jobs.
-The experts of `imitation` and `ablation` are the best TRPO runs of `trpo`, which must be there.
+The experts of `imitation` and `ablation` are the best of the runs of `trpo` (which must be there) that did not fall in any
+of their 50 evaluation episodes.
 """
 
 import argparse
@@ -136,8 +137,9 @@ def measure_trpo(work: Path, jobs: int) -> None:
 
 
 def demonstrations(work: Path, environment: str, trajectories: int) -> Path:
-    """Of the mean action of the best TRPO run, three quarters of the single actions removed."""
+    """Of the mean action of the best TRPO run that never fell; three quarters of the actions removed."""
     runs = [work / "trpo" / environment / str(seed) for seed in SEEDS]
+    runs = [run for run in runs if evaluate(run)["min_length"] == 1000]
     expert = max(runs, key=lambda run: evaluate(run)["mean_return"])
     masked = work / "demonstrations" / f"{environment}-{trajectories}.hdf5"
     if not masked.exists():

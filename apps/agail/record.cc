@@ -1,7 +1,9 @@
 // agail record: demonstrations from a policy.
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
+#include "agail/base/atomic_file.h"
 #include "agail/demos/minari_writer.h"
 #include "agail/train/evaluation.h"
 #include "commands.h"
@@ -19,6 +21,7 @@ struct Options {
 
 void run(const Options& options) {
   const SavedPolicy policy = SavedPolicy::load(policy_file(options.policy));
+  create_output_folder(std::filesystem::path(options.out).parent_path());
   ThreadPool pool(default_threads());
   const Demonstrations demos =
       record(policy, options.episodes, options.seed, options.stochastic, pool);

@@ -124,7 +124,8 @@ void Collector::replay(const Batch& batch) {
     std::vector<float> executed(static_cast<std::size_t>(spec().action.dim));
     if (lane.episode < 0) start_episode(index);
     for (Index t = 0; t < batch.steps; ++t) {
-      clip_action(spec().action, batch.actions.col(index * batch.steps + t).data(), executed.data());
+      clip_action(spec().action, batch.actions.col(index * batch.steps + t).data(),
+                  executed.data());
       const StepResult result = lane.environment->step(executed);
       lane.episode_return += result.reward;
       if (result.terminated || result.truncated) start_episode(index);

@@ -55,8 +55,8 @@ class Collector {
   void collect(const PolicyNetwork<float>& network, const Vector<float>& theta,
                const Normalizer& normalizer, Batch& batch, Stopwatch& stopwatch);
 
-  // Steps through the actions of a batch again, from the state that this collector is in: the same physics without
-  // any learning or network, which is what training is measured against.
+  // Steps through the actions of a batch again, from the state that this collector is in: the same
+  // physics without any learning or network, which is what training is measured against.
   void replay(const Batch& batch);
 
   // Everything that the next batch depends on, the environments' state included.

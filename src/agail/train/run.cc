@@ -19,15 +19,25 @@ namespace fs = std::filesystem;
 
 using Clock = std::chrono::steady_clock;
 
+// What a run that was cut off before it began leaves behind: an empty checkpoints/ and unfinished
+// temporary files.
+bool holds_other_files(const fs::path& folder) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    const bool left_behind = (name == "checkpoints" && fs::is_empty(entry.path())) ||
+                             (name.starts_with('.') && name.ends_with(".tmp"));
+    if (!left_behind) return true;
+  }
+  return false;
+}
+
 void check_folder(const fs::path& folder, bool resume) {
   const bool has_run = fs::exists(folder / "config.toml");
   if (has_run && !resume)
     throw InputError(folder.string() +
                      ": there is a run in this folder; go on with --resume, or give another --out");
-  if (!has_run && fs::exists(folder) && !fs::is_empty(folder))
+  if (!has_run && fs::is_directory(folder) && holds_other_files(folder))
     throw InputError(folder.string() + ": the folder holds other files; give --out a new folder");
-  create_output_folder(folder);
-  create_output_folder(folder / "checkpoints");
 }
 
 void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutcome& outcome,
@@ -91,11 +101,16 @@ RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) 
   const RunSettings run = task.settings.run;
   check_folder(folder, resume);
   InterruptGuard guard;
-  Trainer trainer(std::move(task));
+  Trainer trainer(
+      std::move(task));  // a task that makes no sense ends here, and leaves nothing behind
+  RunOutcome outcome;
+  outcome.signal = interrupted();
+  if (outcome.signal != 0) return outcome;
+  create_output_folder(folder);
+  create_output_folder(folder / "checkpoints");
   const bool selects_best =
       trainer.task().method == "trpo";  // an imitator has no true reward to select by
 
-  RunOutcome outcome;
   double best_return = -std::numeric_limits<double>::max();
   const CheckpointFile checkpoint(folder, trainer.task());
   const bool resumed = resume && checkpoint.load(trainer, best_return);
@@ -118,6 +133,12 @@ RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) 
   if (trainer.cloning() && trainer.learns_by_interaction() && !resumed && run.evaluate_every > 0)
     outcome.cloned = evaluate_now();
 
+  std::int64_t saved_timesteps = -1;
+  const auto save = [&] {
+    log.flush();  // what the checkpoint has seen is in the log
+    checkpoint.save(trainer, best_return);
+    saved_timesteps = trainer.timesteps();
+  };
   // An interrupt waits for the update and its evaluation: a second or so.
   while (!trainer.finished() && interrupted() == 0) {
     const UpdateReport report = trainer.update();
@@ -125,9 +146,9 @@ RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) 
     if (run.evaluate_every > 0 && (report.update % run.evaluate_every == 0 || trainer.finished()))
       evaluation = evaluate_now();
     log.update(report, trainer.stopwatch(), evaluation);
-    if (report.update % run.checkpoint_every == 0 || trainer.finished() || interrupted() != 0)
-      checkpoint.save(trainer, best_return);
+    if (report.update % run.checkpoint_every == 0 || trainer.finished()) save();
   }
+  if (trainer.learns_by_interaction() && saved_timesteps != trainer.timesteps()) save();
   if (!trainer.learns_by_interaction() && interrupted() == 0) evaluate_now();
   log.finish();
 

@@ -27,6 +27,8 @@ class RunLog {
 
   void update(const UpdateReport& report, const Stopwatch& stopwatch,
               const std::optional<Evaluation>& evaluation);
+  // Hands everything to the operating system.
+  void flush() { events_.flush(); }
   // Ends the bar, if there is one.
   void finish();
 

@@ -1,0 +1,38 @@
+"""That it learns, not only that it runs. The bars are far below what docs/results.md reports."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+DATA = Path(__file__).resolve().parents[2] / "data"
+
+
+def train_and_evaluate(agail, tmp_path: Path, environment: str, method: str, *options) -> dict:
+    run = tmp_path / f"{environment}-{method}-{len(list(tmp_path.iterdir()))}"
+    agail("train", environment, "--method", method, "--out", run, *options)
+    return json.loads(agail("eval", run, "--episodes", 50, "--json").stdout)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_trpo_balances_the_pole(agail, tmp_path, seed):
+    result = train_and_evaluate(agail, tmp_path, "CartPole-v0", "trpo", "--seed", seed)
+    assert result["mean_return"] >= 195
+
+
+def test_agail_hops_from_a_quarter_of_the_actions(agail, tmp_path):
+    options = ["--demos", DATA / "hopper-v5.hdf5", "--timesteps", 20_000]
+    result = train_and_evaluate(agail, tmp_path, "Hopper-v5", "agail", *options)
+    assert result["share_of_demonstrations"] >= 0.9
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("environment", "bar"), [("Hopper-v5", 3200), ("Walker2d-v5", 3800), ("Humanoid-v4", 550)]
+)
+def test_trpo_reaches_the_bar(agail, tmp_path, environment, bar):
+    results = [
+        train_and_evaluate(agail, tmp_path, environment, "trpo", "--seed", seed)
+        for seed in range(5)
+    ]
+    assert sum(result["mean_return"] for result in results) / 5 >= bar
