@@ -120,8 +120,9 @@ TEST_P(AgailTest, MissingActionsAreNeverRead) {
       term.add_gradient(theta, gradient);
       cloned.push_back(gradient);
       inferred.emplace_back();
+      Matrix<float> available;
       infer_missing_actions(data, spec.action, {.hidden = {8}, .epochs = 3}, 5, pool, 1,
-                            inferred.back());
+                            inferred.back(), available);
       EXPECT_TRUE(inferred.back().allFinite());
       EXPECT_TRUE(reference::same_bits(cloned[cloned.size() - 2], cloned[0]));
       EXPECT_TRUE(reference::same_bits(cloned[cloned.size() - 1], cloned[1]));

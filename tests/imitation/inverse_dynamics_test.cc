@@ -27,9 +27,9 @@ TEST(InverseDynamics, RecoversTheActionsOfALinearSystem) {
   ThreadPool pool(1);
   InverseDynamicsSettings settings;
   settings.hidden = {32, 32};
-  Matrix<float> inferred;
+  Matrix<float> inferred, available;
   const RegressionReport report =
-      infer_missing_actions(demos, space, settings, 5, pool, 1, inferred);
+      infer_missing_actions(demos, space, settings, 5, pool, 1, inferred, available);
   EXPECT_GT(report.quality, 0.99);
   double error = 0, variance = 0;
   Index missing = 0;
@@ -45,7 +45,30 @@ TEST(InverseDynamics, RecoversTheActionsOfALinearSystem) {
       EXPECT_LE(std::abs(inferred(i, j)), 1);
     }
   EXPECT_EQ(missing, 2 * 3500);
+  EXPECT_EQ(available.minCoeff(), 1);
   EXPECT_GT(1 - error / variance, 0.99);
+}
+
+TEST(InverseDynamics, LeavesADimensionMissingThatNothingTells) {
+  constexpr Index n = 200;
+  RandomStream random(1, Purpose::kRecord);
+  Matrix<double> states(3, n + 1), actions(2, n);
+  for (double& value : states.reshaped()) value = random.normal();
+  for (double& value : actions.reshaped()) value = random.uniform(-1, 1);
+  const ActionSpace space = continuous_actions(2);
+  Demonstrations demonstrations = demonstrations_from(states, actions, space);
+  remove_actions(demonstrations,
+                 {.pattern = MaskPattern::kDimension, .ratio = 0.5, .seed = 3, .dimension = 1});
+  remove_actions(demonstrations,
+                 {.pattern = MaskPattern::kStep, .ratio = 0.5, .seed = 3, .dimension = {}});
+  const DemoData demos(demonstrations);
+  ThreadPool pool(1);
+  Matrix<float> inferred, available;
+  infer_missing_actions(demos, space, {.hidden = {8}, .epochs = 3}, 5, pool, 1, inferred,
+                        available);
+  EXPECT_EQ(available.row(0).minCoeff(), 1);
+  EXPECT_EQ(available.row(1).maxCoeff(), 0);
+  EXPECT_EQ(inferred.row(1).cwiseAbs().maxCoeff(), 0);
 }
 
 TEST(InverseDynamics, RecoversDiscreteActions) {
@@ -63,9 +86,9 @@ TEST(InverseDynamics, RecoversDiscreteActions) {
                  {.pattern = MaskPattern::kStep, .ratio = 0.5, .seed = 3, .dimension = {}});
   const DemoData demos(demonstrations);
   ThreadPool pool(1);
-  Matrix<float> inferred;
-  const RegressionReport report =
-      infer_missing_actions(demos, space, {.hidden = {32}, .epochs = 60}, 5, pool, 1, inferred);
+  Matrix<float> inferred, available;
+  const RegressionReport report = infer_missing_actions(
+      demos, space, {.hidden = {32}, .epochs = 60}, 5, pool, 1, inferred, available);
   EXPECT_GT(report.quality, 0.99);
   Index wrong = 0;
   for (Index j = 0; j < n; ++j) wrong += static_cast<double>(inferred(0, j)) != actions(0, j);

@@ -6,6 +6,7 @@ The tests recompute them with this project's own derivatives. Needs torch (measu
 nothing else here does. All arrays are flat and column-major, parameters as in src/agail/nn/mlp.h:
 W_l (out x in, column-major), then b_l, for each layer; then log_std.
 """
+
 import json
 
 import torch
@@ -15,7 +16,9 @@ torch.manual_seed(7)
 
 
 def flat(x):
-    return [float(f"{v:.17g}") for v in (x.detach().t().reshape(-1) if x.dim() == 2 else x.detach())]
+    return [
+        float(f"{v:.17g}") for v in (x.detach().t().reshape(-1) if x.dim() == 2 else x.detach())
+    ]
 
 
 def mlp(theta, sizes, x):

@@ -84,7 +84,7 @@ std::span<const Setting> settings_table() {
     {AGAIL_SETTING(bc.epochs), at_least(1), "", "largest number of passes over the demonstrations"},
     {AGAIL_SETTING(bc.learning_rate), above(0), "", "step size of Adam"},
     {AGAIL_SETTING(bc.minibatch), at_least(1), "samples", "samples of one Adam step"},
-    {AGAIL_SETTING(bc.validation_share), from_to_below(0, 1), "", "share of the episodes that is held out to choose the epoch"},
+    {AGAIL_SETTING(bc.validation_share), from_to_below(0, 1), "", "share of the demonstrated steps that is held out to choose the epoch"},
 
     {AGAIL_SETTING(inverse_dynamics.hidden), at_least(1), "units", "hidden layers of the inverse dynamics network (tanh)"},
     {AGAIL_SETTING(inverse_dynamics.epochs), at_least(1), "", "passes over the data"},

@@ -6,8 +6,8 @@ namespace agail {
 
 RegressionReport infer_missing_actions(const DemoData& demos, const ActionSpace& action,
                                        const InverseDynamicsSettings& settings, double clip,
-                                       ThreadPool& pool, std::uint64_t seed,
-                                       Matrix<float>& actions) {
+                                       ThreadPool& pool, std::uint64_t seed, Matrix<float>& actions,
+                                       Matrix<float>& available) {
   const Index dim = demos.states.rows();
   const Index n = demos.size();
   // The network sees s and s' - s, each in units of its own deviation: the difference is what an
@@ -41,6 +41,9 @@ RegressionReport infer_missing_actions(const DemoData& demos, const ActionSpace&
                   pool, seed, Purpose::kInverseDynamics);
 
   actions = demos.actions;
+  available = demos.available;
+  const Vector<float> known =
+      demos.available.rowwise().maxCoeff();  // dimensions that some demonstration tells
   Tape<float> tape = network.mlp.make_tape(n);
   for_each_chunk(pool, n, [&](int, Index first, Index count) {
     network.mlp.forward(theta.data(), x.block(0, first, 2 * dim + 1, count), tape, first);
@@ -48,8 +51,11 @@ RegressionReport infer_missing_actions(const DemoData& demos, const ActionSpace&
     for (Index j = first; j < first + count; ++j) {
       network.distribution.mode(tape.outputs.back().col(j).data(), guess.data());
       clip_action(action, guess.data(), guess.data());
-      for (Index i = 0; i < action.dim; ++i)
-        if (demos.available(i, j) == 0) actions(i, j) = guess[static_cast<std::size_t>(i)];
+      for (Index i = 0; i < action.dim; ++i) {
+        if (demos.available(i, j) == 0 && known[i] != 0)
+          actions(i, j) = guess[static_cast<std::size_t>(i)];
+        available(i, j) = known[i];
+      }
     }
   });
   return report;

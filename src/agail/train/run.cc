@@ -19,13 +19,24 @@ namespace fs = std::filesystem;
 
 using Clock = std::chrono::steady_clock;
 
+// A file that write_file_atomically was killed over.
+bool is_unfinished(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.starts_with('.') && name.ends_with(".tmp");
+}
+
+void remove_unfinished_files(const fs::path& folder) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (is_unfinished(entry.path())) fs::remove(entry.path());
+}
+
 // What a run that was cut off before it began leaves behind: an empty checkpoints/ and unfinished
 // temporary files.
 bool holds_other_files(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    const bool left_behind = (name == "checkpoints" && fs::is_empty(entry.path())) ||
-                             (name.starts_with('.') && name.ends_with(".tmp"));
+    const bool left_behind =
+        (entry.path().filename() == "checkpoints" && fs::is_empty(entry.path())) ||
+        is_unfinished(entry.path());
     if (!left_behind) return true;
   }
   return false;
@@ -108,6 +119,8 @@ RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) 
   if (outcome.signal != 0) return outcome;
   create_output_folder(folder);
   create_output_folder(folder / "checkpoints");
+  remove_unfinished_files(folder);
+  remove_unfinished_files(folder / "checkpoints");
   const bool selects_best =
       trainer.task().method == "trpo";  // an imitator has no true reward to select by
 

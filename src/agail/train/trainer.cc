@@ -101,10 +101,9 @@ void Trainer::start() {
   const bool infers = adversarial && settings.start.method == "clone-inferred" && missing > 0;
   CloningTargets targets{demos_->actions, demos_->available, demos_->some_action};
   if (infers) {
-    inverse_dynamics_ =
-        infer_missing_actions(*demos_, spec_.action, settings.inverse_dynamics,
-                              settings.policy.observation_clip, pool_, task_.seed, targets.actions);
-    targets.available.setOnes();
+    inverse_dynamics_ = infer_missing_actions(*demos_, spec_.action, settings.inverse_dynamics,
+                                              settings.policy.observation_clip, pool_, task_.seed,
+                                              targets.actions, targets.available);
     targets.columns.resize(static_cast<std::size_t>(demos_->size()));
     std::iota(targets.columns.begin(), targets.columns.end(), Index{0});
   }
