@@ -55,7 +55,7 @@ TEST(InverseDynamics, LeavesADimensionMissingThatNothingTells) {
   Matrix<double> states(3, n + 1), actions(2, n);
   for (double& value : states.reshaped()) value = random.normal();
   for (double& value : actions.reshaped()) value = random.uniform(-1, 1);
-  const ActionSpace space = continuous_actions(2);
+  const ActionSpace space = continuous_actions(2, 1);
   Demonstrations demonstrations = demonstrations_from(states, actions, space);
   remove_actions(demonstrations,
                  {.pattern = MaskPattern::kDimension, .ratio = 0.5, .seed = 3, .dimension = 1});
