@@ -13,7 +13,7 @@ import matplotlib
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
-from measure import ROOT, SEEDS, curve, demonstrated_return
+from measure import ROOT, SEEDS, curve, demonstrated_return, evaluate
 
 COLOURS = {"agail": "#1b6ca8", "gail": "#8f5fb0", "state-gail": "#d9822b", "bc": "#5a8f3c"}
 
@@ -21,12 +21,12 @@ COLOURS = {"agail": "#1b6ca8", "gail": "#8f5fb0", "state-gail": "#d9822b", "bc":
 def draw(axis: plt.Axes, runs: Path) -> None:
     for method, colour in COLOURS.items():
         folders = [runs / method / str(seed) for seed in SEEDS]
+        if method == "bc":
+            share = mean(evaluate(folder)["share_of_demonstrations"] for folder in folders)
+            axis.axhline(share, color=colour, linestyle="--", label="behaviour cloning (mean)")
+            continue
         demonstrated = demonstrated_return(folders[0])
         curves = [[(x, y / demonstrated) for x, y in curve(folder)] for folder in folders]
-        if method == "bc":
-            ends = [c[-1][1] for c in curves]
-            axis.axhline(mean(ends), color=colour, linestyle="--", label="behaviour cloning (mean)")
-            continue
         steps = [x for x, _ in curves[0]]
         shares = [[c[i][1] for c in curves] for i in range(len(steps))]
         axis.plot(steps, [mean(s) for s in shares], color=colour, label=method)
