@@ -1,6 +1,5 @@
 """That it learns, not only that it runs. The bars are far below what docs/results.md reports."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -10,8 +9,8 @@ DATA = Path(__file__).resolve().parents[2] / "data"
 
 def train_and_evaluate(agail, tmp_path: Path, environment: str, method: str, *options) -> dict:
     run = tmp_path / f"{environment}-{method}-{len(list(tmp_path.iterdir()))}"
-    agail("train", environment, "--method", method, "--out", run, *options)
-    return json.loads(agail("eval", run, "--episodes", 50, "--json").stdout)
+    agail("train", environment, "--method", method, "--threads", 1, "--out", run, *options)
+    return agail.json("eval", run, "--episodes", 50)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
