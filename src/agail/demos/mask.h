@@ -6,9 +6,8 @@
 // larger ratio's mask contains a smaller one's.
 //   step       single steps; round(ratio * T) of them in each episode (halves go up)
 //   block      runs of 20 steps (the last one cut short); round(ratio * T) steps in each episode
-//   episode    whole episodes; as many, in the drawn order, as bring their share of all entries
-//   closest to the ratio dimension  whole action channels, in every step of every episode;
-//   round(ratio * channels) of them
+//   episode    whole episodes, in the drawn order, so that their share of all entries is closest
+//   dimension  whole action channels, in every step; round(ratio * channels) of them
 //
 // The ratio is that of what is chosen now, whatever is missing already; the result misses both. So
 // removing only ever adds to what is missing, and doing it twice with one seed is doing it once

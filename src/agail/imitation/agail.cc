@@ -12,8 +12,7 @@ std::vector<Index> columns_for(const std::string& method, const DemoData& demos)
     if (demos.full_action.empty())
       throw InputError(
           "method gail learns from states with complete actions, but the demonstrations have none; "
-          "use "
-          "--method agail or state-gail");
+          "use --method agail or state-gail");
     return demos.full_action;
   }
   std::vector<Index> all(static_cast<std::size_t>(demos.size()));

@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kFormat = "agail-checkpoint-1";
 
 std::map<std::string, std::string> identity(const TrainingTask& task) {
-  // A run may be made longer, and evaluated or saved more or less often, without becoming another.
+  // A run may be made longer, and saved more or less often, without becoming another.
   Settings settings = task.settings;
   settings.run.timesteps = 1;
   settings.run.checkpoint_every = 1;

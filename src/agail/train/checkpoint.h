@@ -12,7 +12,7 @@ namespace agail {
 
 class CheckpointFile {
  public:
-  // In `folder`/checkpoints. The task must outlive this object; its identity is taken once, here.
+  // In `folder`/checkpoints. What identifies the task is taken once, here.
   CheckpointFile(const std::filesystem::path& folder, const TrainingTask& task);
 
   // `best_return`: of the best evaluation so far.
