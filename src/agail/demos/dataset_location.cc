@@ -76,7 +76,7 @@ std::string dataset_id_for(const std::string& folder) {
   std::error_code error;
   const fs::path here = fs::weakly_canonical(fs::absolute(folder), error);
   const fs::path root = fs::weakly_canonical(fs::absolute(minari_root()), error);
-  const std::string below = here.lexically_relative(root).generic_string();
+  std::string below = here.lexically_relative(root).generic_string();
   if (!below.empty() && below != "." && !below.starts_with("..")) {
     if (!std::regex_match(below, id_form()))
       throw InputError(folder +

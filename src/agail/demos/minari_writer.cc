@@ -99,7 +99,7 @@ std::string observation_space(const json& source, const Demonstrations& demonstr
   const int dim = demonstrations.observation_dim;
   const bool float32 = demonstrations.observations_are_float32;
   if (source.contains("observation_space") && source["observation_space"].is_string()) {
-    const auto text = source["observation_space"].get<std::string>();
+    auto text = source["observation_space"].get<std::string>();
     const json space = parse_python_json(text, "observation_space");
     if (space.is_object() && space.value("shape", json()) == json::array({dim}) &&
         space.value("dtype", json()) == (float32 ? "float32" : "float64"))

@@ -1,7 +1,7 @@
 #include "agail/demos/replace_folder.h"
 
 #include <fcntl.h>
-#include <stdio.h>
+#include <stdio.h>  // NOLINT(modernize-deprecated-headers): renameat2
 #include <unistd.h>
 
 #include <cerrno>

@@ -9,10 +9,10 @@ namespace agail {
 // InputError unless `folder` is absent, empty, or a Minari dataset and nothing else.
 void check_replaceable_dataset(const std::filesystem::path& folder);
 
-// `fill` writes into a temporary sibling, which then takes the place of `folder` in one step (where
+// `fill` writes into a temporary sibling, which then takes the place of `target` in one step (where
 // the file system can exchange two names; elsewhere there is a moment without either). InputError
 // if nothing can be created there.
-void replace_folder(const std::filesystem::path& folder,
+void replace_folder(const std::filesystem::path& target,
                     const std::function<void(const std::filesystem::path&)>& fill);
 
 }  // namespace agail

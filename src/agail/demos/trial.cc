@@ -1,7 +1,7 @@
 #include "agail/demos/trial.h"
 
 #include <fcntl.h>
-#include <signal.h>
+#include <signal.h>  // NOLINT(modernize-deprecated-headers): POSIX's, not C's
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>

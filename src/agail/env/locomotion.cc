@@ -19,7 +19,7 @@ EnvironmentSpec make_spec(const LocomotionTask& task, const mjModel& model) {
   spec.id = task.id;
   spec.observation_dim = observation_dim(task, model);
   spec.action.dim = static_cast<int>(model.nu);
-  for (int i = 0; i < model.nu; ++i) {
+  for (std::ptrdiff_t i = 0; i < model.nu; ++i) {
     spec.action.low.push_back(static_cast<float>(model.actuator_ctrlrange[2 * i]));
     spec.action.high.push_back(static_cast<float>(model.actuator_ctrlrange[2 * i + 1]));
   }

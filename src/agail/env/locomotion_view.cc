@@ -57,8 +57,10 @@ void observe(const LocomotionView& view, std::span<double> observation) {
     return std::clamp(v, -task.velocity_clip, task.velocity_clip);
   });
   if (task.observe_bodies) {
-    out = std::copy(d.cinert + 10 * task.first_body, d.cinert + 10 * m.nbody, out);
-    out = std::copy(d.cvel + 6 * task.first_body, d.cvel + 6 * m.nbody, out);
+    const std::ptrdiff_t first = task.first_body;
+    const std::ptrdiff_t bodies = m.nbody;
+    out = std::copy(d.cinert + 10 * first, d.cinert + 10 * bodies, out);
+    out = std::copy(d.cvel + 6 * first, d.cvel + 6 * bodies, out);
     out = std::copy(d.qfrc_actuator + task.first_actuator_dof, d.qfrc_actuator + m.nv, out);
   }
   if (task.observe_contacts)
@@ -76,7 +78,7 @@ double progress(const LocomotionView& view) {
       break;
   }
   const mjtNum* mass = view.model.body_mass;
-  const std::size_t bodies = static_cast<std::size_t>(view.model.nbody);
+  const auto bodies = static_cast<std::size_t>(view.model.nbody);
   double moment = 0;  // np.einsum adds in order, np.sum does not
   for (std::size_t i = 0; i < bodies; ++i) moment += mass[i] * view.data.xipos[3 * i];
   return moment / numpy_sum<double>(0, bodies, [mass](std::size_t i) { return mass[i]; });

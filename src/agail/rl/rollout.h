@@ -75,9 +75,9 @@ class Collector {
     Tape<float> tape;
     std::vector<float> executed;
   };
-  void collect_lane(Index lane, const PolicyNetwork<float>& network, const Vector<float>& theta,
+  void collect_lane(Index index, const PolicyNetwork<float>& network, const Vector<float>& theta,
                     const Normalizer& normalizer, Batch& batch, Worker& worker);
-  void start_episode(Index lane);
+  void start_episode(Index index);
 
   std::uint64_t seed_;
   ThreadPool& pool_;
