@@ -1,7 +1,7 @@
 // A folder that lives as long as the test.
 #pragma once
 
-#include <stdlib.h>
+#include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp
 
 #include <filesystem>
 #include <string>

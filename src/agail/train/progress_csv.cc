@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <system_error>
+#include <utility>
 
 #include "agail/base/atomic_file.h"
 #include "agail/base/error.h"
@@ -48,8 +49,8 @@ std::string read_text(const fs::path& path) {
 
 }  // namespace
 
-ProgressCsv::ProgressCsv(const fs::path& path, std::vector<std::string> columns)
-    : path_(path), columns_(std::move(columns)) {
+ProgressCsv::ProgressCsv(fs::path path, std::vector<std::string> columns)
+    : path_(std::move(path)), columns_(std::move(columns)) {
   for (const std::string& column : columns_)
     AGAIL_CHECK(column.find_first_of(",\"\n") == std::string::npos);
   const std::string header = joined(columns_);
@@ -88,8 +89,8 @@ void ProgressCsv::truncate_after(std::string_view column, double value) {
   const std::string text = read_text(path_);
   std::string kept = joined(columns_);
   std::size_t number = 2;  // of the line, for messages
-  for (std::size_t begin = kept.size(), end; (end = text.find('\n', begin)) != std::string::npos;
-       begin = end + 1, ++number) {
+  for (std::size_t begin = kept.size(), end = 0;
+       (end = text.find('\n', begin)) != std::string::npos; begin = end + 1, ++number) {
     const std::string_view line = std::string_view(text).substr(begin, end - begin);
     const std::vector<std::string_view> cells = split(line);
     double at = 0;

@@ -15,7 +15,7 @@ class ProgressCsv {
  public:
   // Starts the file, or goes on behind the rows that are there. InputError if it has other columns;
   // SystemError if it cannot be written, here and below.
-  ProgressCsv(const std::filesystem::path& path, std::vector<std::string> columns);
+  ProgressCsv(std::filesystem::path path, std::vector<std::string> columns);
 
   // One value a column, in the shortest form that reads back as the same double; NaN is an empty
   // cell. The row is with the operating system when this returns.

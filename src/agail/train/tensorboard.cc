@@ -37,17 +37,20 @@ std::string varint(std::uint64_t value) {
   return out + static_cast<char>(value);
 }
 
+std::string key(std::uint64_t number, std::uint64_t wire_type) {
+  return varint(number * 8 + wire_type);
+}
 std::string int_field(unsigned number, std::int64_t value) {
-  return varint(number * 8) + varint(static_cast<std::uint64_t>(value));
+  return key(number, 0) + varint(static_cast<std::uint64_t>(value));
 }
 std::string double_field(unsigned number, double value) {
-  return varint(number * 8 + 1) + little_endian(std::bit_cast<std::uint64_t>(value));
+  return key(number, 1) + little_endian(std::bit_cast<std::uint64_t>(value));
 }
 std::string float_field(unsigned number, float value) {
-  return varint(number * 8 + 5) + little_endian(std::bit_cast<std::uint32_t>(value));
+  return key(number, 5) + little_endian(std::bit_cast<std::uint32_t>(value));
 }
 std::string bytes_field(unsigned number, std::string_view value) {
-  return varint(number * 8 + 2) + varint(value.size()) + std::string(value);
+  return key(number, 2) + varint(value.size()) + std::string(value);
 }
 
 // event.proto and summary.proto of TensorFlow.
