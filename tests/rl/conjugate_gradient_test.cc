@@ -32,6 +32,20 @@ TEST(ConjugateGradient, SolvesWhatAFactorisationSolves) {
   EXPECT_LE(reference::relative_error(found, expected), 1e-5);
 }
 
+TEST(ConjugateGradient, CurvatureNeedsNoFurtherProduct) {
+  constexpr Index n = 30;
+  const Matrix<double> b = reference::normal_matrix(n, n, 1);
+  const Matrix<double> a = b * b.transpose() / n + Matrix<double>::Identity(n, n);
+  const Vector<double> right = reference::normal_vector(n, 2);
+  ConjugateGradient<double> solver(n);
+  for (const int iterations : {0, 3, 100}) {  // also far from the solution
+    const Vector<double> x =
+        solver.solve([&](const Vector<double>& v, Vector<double>& result) { result = a * v; },
+                     right, iterations);
+    EXPECT_NEAR(solver.curvature(right), x.dot(a * x), 1e-9) << iterations << " iterations";
+  }
+}
+
 // k different eigenvalues take k iterations.
 TEST(ConjugateGradient, EndsAfterAsManyStepsAsThereAreEigenvalues) {
   const Vector<double> diagonal{{1, 1, 4, 4, 9, 9, 9}};

@@ -78,6 +78,18 @@ TEST_P(PolicyObjectiveTest, ValuesEqualTheReference) {
   EXPECT_NEAR(objective.evaluate(theta_).kl, 0, 1e-15);
 }
 
+TEST_P(PolicyObjectiveTest, ValuesAtTheOldParametersNeedNoPass) {
+  ThreadPool pool(1);
+  PolicyObjective<double> objective(network_, pool, kSamples, 1);
+  objective.bind(theta_, x_, actions_, advantages_, kSamples, 0.3);
+  const auto kept = objective.evaluate_old();
+  const auto computed = objective.evaluate(theta_);
+  EXPECT_EQ(kept.surrogate, computed.surrogate);
+  EXPECT_EQ(kept.entropy, computed.entropy);
+  EXPECT_EQ(kept.kl, 0);
+  EXPECT_NEAR(computed.kl, 0, 1e-15);
+}
+
 TEST_P(PolicyObjectiveTest, GradientOfTheSurrogate) {
   ThreadPool pool(1);
   for (const double entropy_weight : {0.0, 0.3}) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "agail/base/error.h"
+#include "agail/nn/product.h"
 
 namespace agail {
 
@@ -73,7 +74,7 @@ void Mlp<S>::forward(const S* theta, const ConstView<S>& x, Tape<S>& tape, Index
   for (Index l = 0; l < layers(); ++l) {
     Matrix<S>& outputs = tape.outputs[static_cast<std::size_t>(l)];
     auto z = outputs.block(0, first, out(l), n);
-    z.noalias() = weights(theta, l) * input(x, tape, l, first, n);
+    multiply<S>(weights(theta, l), input(x, tape, l, first, n), z);
     if (last(l)) break;
     // Whole padded columns: rows past the bias row hold zero, and f(0) = 0.
     for (Index j = first; j < first + n; ++j) {
@@ -98,16 +99,16 @@ void Mlp<S>::backward(const S* theta, const ConstView<S>& x, const Tape<S>& tape
   delta->block(0, 0, outputs(), n) = adjoint;
   for (Index l = layers() - 1; l >= 0; --l) {
     const auto d = delta->block(0, 0, out(l), n);
-    weights(gradient, l).noalias() = d * input(x, tape, l, first, n).transpose();
+    multiply_by_transposed<S>(d, input(x, tape, l, first, n), weights(gradient, l));
     const auto w = weights(theta, l).leftCols(in(l));
     if (l > 0) {
       auto under = below->block(0, 0, in(l), n);
-      under.noalias() = w.transpose() * d;
+      multiply_transposed<S>(w, d, under);
       multiply_by_slope(under,
                         tape.outputs[static_cast<std::size_t>(l) - 1].block(0, first, in(l), n));
       std::swap(delta, below);
     } else if (input_adjoint != nullptr) {
-      input_adjoint->noalias() = w.transpose() * d;
+      multiply_transposed<S>(w, d, *input_adjoint);
     }
   }
 }
@@ -121,8 +122,9 @@ void Mlp<S>::tangent(const S* theta, const S* v, const ConstView<S>& x, const Ta
   for (Index l = 0; l < layers(); ++l) {
     // z'_l = V_l h_{l-1} + W_l h'_{l-1},  h'_l = f'(z_l) z'_l
     auto dz = here->block(0, 0, out(l), n);
-    dz.noalias() = weights(v, l) * input(x, tape, l, first, n);
-    if (l > 0) dz.noalias() += weights(theta, l).leftCols(in(l)) * below->block(0, 0, in(l), n);
+    multiply<S>(weights(v, l), input(x, tape, l, first, n), dz);
+    if (l > 0)
+      multiply<S>(weights(theta, l).leftCols(in(l)), below->block(0, 0, in(l), n), dz, true);
     if (last(l))
       result = dz;
     else
@@ -146,7 +148,7 @@ double Mlp<S>::add_gradient_penalty(const S* theta, const ConstView<S>& x, const
   delta->block(0, 0, 1, n).setOnes();
   for (Index l = layers() - 1; l >= 0; --l) {
     auto under = below->block(0, 0, in(l), n);
-    under.noalias() = weights(theta, l).leftCols(in(l)).transpose() * delta->block(0, 0, out(l), n);
+    multiply_transposed<S>(weights(theta, l).leftCols(in(l)), delta->block(0, 0, out(l), n), under);
     if (l > 0) multiply_by_slope(under, hidden(l - 1));
     std::swap(delta, below);
   }
@@ -173,9 +175,9 @@ double Mlp<S>::add_gradient_penalty(const S* theta, const ConstView<S>& x, const
     auto sl = s[i].block(0, 0, out(l), n);
     const auto w = weights(theta, l).leftCols(in(l));
     if (l == 0)
-      sl.noalias() = w * u;
+      multiply<S>(w, u, sl);
     else
-      sl.noalias() = w * t[i - 1].block(0, 0, in(l), n);
+      multiply<S>(w, t[i - 1].block(0, 0, in(l), n), sl);
     auto tl = t[i].block(0, 0, out(l), n);
     tl = sl;
     multiply_by_slope(tl, hidden(l));
@@ -191,17 +193,17 @@ double Mlp<S>::add_gradient_penalty(const S* theta, const ConstView<S>& x, const
     const auto zb = z_bar->block(0, 0, out(l), n);
     Weights grad = weights(gradient, l);
     if (l == 0)
-      grad.leftCols(in(l)).noalias() += sb * u.transpose();
+      multiply_by_transposed<S>(sb, u, grad.leftCols(in(l)), true);
     else
-      grad.leftCols(in(l)).noalias() +=
-          sb * t[static_cast<std::size_t>(l) - 1].block(0, 0, in(l), n).transpose();
-    if (!last(l)) grad.noalias() += zb * input(x, tape, l, first, n).transpose();
+      multiply_by_transposed<S>(sb, t[static_cast<std::size_t>(l) - 1].block(0, 0, in(l), n),
+                                grad.leftCols(in(l)), true);
+    if (!last(l)) multiply_by_transposed<S>(zb, input(x, tape, l, first, n), grad, true);
     if (l == 0) break;
     const auto w = weights(theta, l).leftCols(in(l));
     auto tb = t_bar->block(0, 0, in(l), n);
     auto hb = h_bar->block(0, 0, in(l), n);
-    tb.noalias() = w.transpose() * sb;
-    hb.noalias() = w.transpose() * zb;
+    multiply_transposed<S>(w, sb, tb);
+    multiply_transposed<S>(w, zb, hb);
     const auto h = hidden(l - 1);
     multiply_by_slope(hb, h);
     if (activation_ == Activation::kTanh)  // f'' = -2 h (1 - h^2); zero for the leaky rectifier

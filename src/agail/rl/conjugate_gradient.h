@@ -31,6 +31,9 @@ class ConjugateGradient {
     return x_;
   }
 
+  // x^T A x of the last solution x, without another product: A x = b - residual.
+  double curvature(const Vector<S>& b) const { return dot(x_, b) - dot(x_, residual_); }
+
   // In double precision, so that float parameters do not lose the small components of a long
   // vector.
   static double dot(const Vector<S>& a, const Vector<S>& b) {

@@ -124,6 +124,25 @@ typename PolicyObjective<S>::Value PolicyObjective<S>::evaluate(const Vector<S>&
         for (Index j = 0; j < count; ++j) out[1] += static_cast<double>(row[j]);
         out[2] = distribution.entropy(output, network_.log_std(theta.data()));
       });
+  return mean(total);
+}
+
+template <class S>
+typename PolicyObjective<S>::Value PolicyObjective<S>::evaluate_old() {
+  const auto total =
+      scalar_sums_.sum(pool_, n_, [&](Index, int, Index first, Index count, double* out) {
+        out[0] = 0;
+        for (Index j = 0; j < count; ++j) out[0] += static_cast<double>((*advantages_)[first + j]);
+        out[1] = 0;
+        out[2] = network_.distribution.entropy(network_.mlp.output(old_tape_, first, count),
+                                               network_.log_std(theta_old_.data()));
+      });
+  return mean(total);
+}
+
+template <class S>
+typename PolicyObjective<S>::Value PolicyObjective<S>::mean(
+    const Eigen::Map<Vector<double>>& total) const {
   const auto n = static_cast<double>(n_);
   Value value{total[0] / n, total[1] / n, total[2] / n};
   value.surrogate += static_cast<double>(entropy_weight_) * value.entropy;

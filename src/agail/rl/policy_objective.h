@@ -35,8 +35,13 @@ class PolicyObjective {
     double entropy = 0;
   };
   Value evaluate(const Vector<S>& theta);
+  // The same at theta_old, where every ratio is 1: from what bind() kept.
+  Value evaluate_old();
 
  private:
+  // Of the batch's sums of surrogate, KL and entropy.
+  Value mean(const Eigen::Map<Vector<double>>& total) const;
+
   const PolicyNetwork<S>& network_;
   ThreadPool& pool_;
   int fisher_stride_;

@@ -18,7 +18,6 @@ Trpo::Trpo(const PolicyNetwork<float>& network, ThreadPool& pool, const TrpoSett
       solver_(network.parameters()),
       gradient_(Vector<float>::Zero(network.parameters())),
       step_(gradient_),
-      product_(gradient_),
       old_(gradient_),
       candidate_(gradient_) {}
 
@@ -44,14 +43,13 @@ TrpoReport Trpo::update(Vector<float>& theta, const Matrix<float>& x, const Matr
     result += damping * v;
   };
   step_ = solver_.solve(multiply, gradient_, static_cast<int>(settings_.cg_iterations));
-  multiply(step_, product_);
-  const double curvature = solver_.dot(step_, product_);
+  const double curvature = solver_.curvature(gradient_);
 
   stopwatch.start(Phase::kLineSearch);
   const auto whole = [&](const Vector<float>& parameters, double surrogate) {
     return auxiliary == nullptr ? surrogate : surrogate + auxiliary->value(parameters);
   };
-  const PolicyObjective<float>::Value before = objective_.evaluate(old_);
+  const PolicyObjective<float>::Value before = objective_.evaluate_old();
   const double start = whole(old_, before.surrogate);
   report.entropy = before.entropy;
   if (std::isfinite(curvature) && curvature > 0) {

@@ -44,7 +44,7 @@ class Trpo {
   TrpoSettings settings_;
   PolicyObjective<float> objective_;
   ConjugateGradient<float> solver_;
-  Vector<float> gradient_, step_, product_, old_, candidate_;
+  Vector<float> gradient_, step_, old_, candidate_;
 };
 
 }  // namespace agail

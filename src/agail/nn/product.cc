@@ -1,0 +1,245 @@
+#include "agail/nn/product.h"
+
+#include <algorithm>
+
+// Eigen's packets are vector types; their alignment, which templates drop, is not relied on.
+#pragma GCC diagnostic ignored "-Wignored-attributes"
+
+// All three products are sums of outer products: c = sum_p a_p b_p^T. A panel of rows of c is cut
+// into tiles of kPackets packets x kColumns columns, as many as the registers hold; a tile runs
+// through all p with one load for each packet of a_p and one broadcast for each element of b_p.
+namespace agail {
+
+namespace {
+
+using Eigen::internal::padd;
+using Eigen::internal::ploadu;
+using Eigen::internal::pmadd;
+using Eigen::internal::pset1;
+using Eigen::internal::pstoreu;
+
+template <class S>
+using Packet = typename Eigen::internal::packet_traits<S>::type;
+template <class S>
+inline constexpr int kWidth = Eigen::internal::packet_traits<S>::size;
+
+constexpr bool kManyRegisters = EIGEN_ARCH_DEFAULT_NUMBER_OF_REGISTERS >= 32;
+constexpr int kPackets = kManyRegisters ? 4 : 2;
+constexpr int kPacketsAlone = 8;  // of a tile with a single column
+constexpr Index kDepth = 256;     // steps of p at a time, so that a packed panel stays in the cache
+
+// One factor as a tile reads it: element (i, p) of a at a[i + p * step], or element (p, j) of b at
+// b[p * step + j * column].
+template <class S>
+struct Left {
+  const S* data;
+  Index step;
+};
+template <class S>
+struct Right {
+  const S* data;
+  Index step, column;
+};
+template <class S>
+struct Result {
+  S* data;
+  Index column;
+  bool add;
+};
+
+// Columns of a tile of `packets`: their sums, one packet of each column and one broadcast fit the
+// registers.
+constexpr int columns_for(int packets) {
+  return kManyRegisters ? (packets > 3 ? 6 : 8) : (packets > 1 ? 4 : 8);
+}
+
+// Rows of a tile. Rows that fill no packet of their own are covered by a last packet that overlaps
+// the one before it, so nothing is read past the end; only its lanes from `from` on are new.
+struct Rows {
+  Index last;  // first row of the last packet
+  Index from;
+};
+
+// Loops over indices known at compile time, which must be unrolled to keep the sums in registers.
+#define AGAIL_UNROLL _Pragma("GCC unroll 8")
+
+template <class S, int P, int N>
+[[gnu::always_inline]] inline void tile(Left<S> a, Right<S> b, Index depth, Result<S> c,
+                                        Rows rows) {
+  Packet<S> sum[P][N];
+  AGAIL_UNROLL
+  for (int j = 0; j < N; ++j) {
+    AGAIL_UNROLL
+    for (int i = 0; i < P; ++i) sum[i][j] = pset1<Packet<S>>(S(0));
+  }
+  for (Index p = 0; p < depth; ++p, a.data += a.step, b.data += b.step) {
+    Packet<S> left[P];
+    AGAIL_UNROLL
+    for (int i = 0; i + 1 < P; ++i) left[i] = ploadu<Packet<S>>(a.data + i * kWidth<S>);
+    left[P - 1] = ploadu<Packet<S>>(a.data + rows.last);
+    AGAIL_UNROLL
+    for (int j = 0; j < N; ++j) {
+      const auto right = pset1<Packet<S>>(b.data[j * b.column]);
+      AGAIL_UNROLL
+      for (int i = 0; i < P; ++i) sum[i][j] = pmadd(left[i], right, sum[i][j]);
+    }
+  }
+  AGAIL_UNROLL
+  for (int j = 0; j < N; ++j) {
+    S* column = c.data + j * c.column;
+    AGAIL_UNROLL
+    for (int i = 0; i < P; ++i) {
+      S* to = column + (i + 1 < P ? i * kWidth<S> : rows.last);
+      if (i + 1 < P || rows.from == 0) {
+        pstoreu(to, c.add ? padd(ploadu<Packet<S>>(to), sum[i][j]) : sum[i][j]);
+      } else {
+        S lanes[kWidth<S>];
+        pstoreu(lanes, sum[i][j]);
+        for (Index r = rows.from; r < kWidth<S>; ++r) to[r] = c.add ? to[r] + lanes[r] : lanes[r];
+      }
+    }
+  }
+}
+
+#undef AGAIL_UNROLL
+
+template <class S, int P>
+void panel_of_packets(Left<S> a, Right<S> b, Index depth, Index columns, Result<S> c, Rows rows) {
+  const auto advance = [&](Index n) {
+    b.data += n * b.column;
+    c.data += n * c.column;
+    columns -= n;
+  };
+  if constexpr (P <= kPackets) {
+    constexpr int kColumns = columns_for(P);
+    for (; columns >= kColumns; advance(kColumns)) tile<S, P, kColumns>(a, b, depth, c, rows);
+    for (; columns >= 4; advance(4)) tile<S, P, 4>(a, b, depth, c, rows);
+    for (; columns >= 2; advance(2)) tile<S, P, 2>(a, b, depth, c, rows);
+  }
+  for (; columns >= 1; advance(1)) tile<S, P, 1>(a, b, depth, c, rows);
+}
+
+template <class S>
+void panel(int packets, Left<S> a, Right<S> b, Index depth, Index columns, Result<S> c, Rows rows) {
+  switch (packets) {
+    case 1:
+      return panel_of_packets<S, 1>(a, b, depth, columns, c, rows);
+    case 2:
+      return panel_of_packets<S, 2>(a, b, depth, columns, c, rows);
+    case 3:
+      return panel_of_packets<S, 3>(a, b, depth, columns, c, rows);
+    case 4:
+      return panel_of_packets<S, 4>(a, b, depth, columns, c, rows);
+    case 5:
+      return panel_of_packets<S, 5>(a, b, depth, columns, c, rows);
+    case 6:
+      return panel_of_packets<S, 6>(a, b, depth, columns, c, rows);
+    case 7:
+      return panel_of_packets<S, 7>(a, b, depth, columns, c, rows);
+    default:
+      return panel_of_packets<S, 8>(a, b, depth, columns, c, rows);
+  }
+}
+
+// to[i + p * step] = from[p + i * column] for i < rows, zero for the other i < step.
+template <class S>
+void pack_transposed(const S* from, Index column, Index rows, Index depth, S* to, Index step) {
+  constexpr Index kBlock = kWidth<S>;
+  for (Index i = 0; i < step; i += kBlock) {
+    Index p = 0;
+    if (i + kBlock <= rows)
+      for (; p + kBlock <= depth; p += kBlock) {
+        Eigen::internal::PacketBlock<Packet<S>, kWidth<S>> block;
+        for (Index r = 0; r < kBlock; ++r)
+          block.packet[r] = ploadu<Packet<S>>(from + p + (i + r) * column);
+        Eigen::internal::ptranspose(block);
+        for (Index r = 0; r < kBlock; ++r) pstoreu(to + i + (p + r) * step, block.packet[r]);
+      }
+    for (; p < depth; ++p)
+      for (Index r = i; r < i + kBlock; ++r)
+        to[r + p * step] = r < rows ? from[p + r * column] : S(0);
+  }
+}
+
+enum class Lies { kPlain, kTransposed };
+
+// For m >= kWidth.
+template <class S, Lies lies>
+void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Index n, Result<S> c) {
+  constexpr Index kW = kWidth<S>;
+  alignas(64) S packed[kDepth * kPackets * kW];
+  const Index tallest = (lies == Lies::kPlain && n == 1 ? kPacketsAlone : kPackets);
+  for (Index p = 0; p < k; p += kDepth) {
+    const Index depth = std::min(kDepth, k - p);
+    const Right<S> right{b.data + p * b.step, b.step, b.column};
+    for (Index done = 0; done < m;) {
+      const Index first = std::min(done, m - kW);
+      // Panels of about equal height: a single packet alone would wait for its own sums.
+      const Index left_over = (m - first + kW - 1) / kW;
+      const Index panels = (left_over + tallest - 1) / tallest;
+      const Index count = std::min((left_over + panels - 1) / panels * kW, m - first);
+      const Index packets = (count + kW - 1) / kW;
+      const Index last = count - kW;
+      const Rows rows{last, std::max(done - first, (packets - 1) * kW) - last};
+      Left<S> left{a + first + p * a_column, a_column};
+      if (lies == Lies::kTransposed) {
+        left = {packed, packets * kW};
+        pack_transposed(a + p + first * a_column, a_column, count, depth, packed, left.step);
+      }
+      panel<S>(static_cast<int>(packets), left, right, depth, n,
+               {c.data + first, c.column, c.add || p > 0}, rows);
+      done = first + count;
+    }
+  }
+}
+
+}  // namespace
+
+// Few rows do not fill a packet; Eigen's products do as well there.
+
+template <class S>
+void multiply(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add) {
+  eigen_assert(a.cols() == b.rows() && c.rows() == a.rows() && c.cols() == b.cols());
+  if (a.rows() >= kWidth<S> && a.cols() > 0)
+    multiply_any<S, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
+                                  {b.data(), 1, b.outerStride()}, b.cols(),
+                                  {c.data(), c.outerStride(), add});
+  else if (add)
+    c.noalias() += a * b;
+  else
+    c.noalias() = a * b;
+}
+
+template <class S>
+void multiply_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S> c) {
+  eigen_assert(a.rows() == b.rows() && c.rows() == a.cols() && c.cols() == b.cols());
+  if (a.cols() >= kWidth<S> && a.rows() > 0)
+    multiply_any<S, Lies::kTransposed>(a.data(), a.outerStride(), a.cols(), a.rows(),
+                                       {b.data(), 1, b.outerStride()}, b.cols(),
+                                       {c.data(), c.outerStride(), false});
+  else
+    c.noalias() = a.transpose() * b;
+}
+
+template <class S>
+void multiply_by_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add) {
+  eigen_assert(a.cols() == b.cols() && c.rows() == a.rows() && c.cols() == b.rows());
+  if (a.rows() >= kWidth<S> && a.cols() > 0)
+    multiply_any<S, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
+                                  {b.data(), b.outerStride(), 1}, b.rows(),
+                                  {c.data(), c.outerStride(), add});
+  else if (add)
+    c.noalias() += a * b.transpose();
+  else
+    c.noalias() = a * b.transpose();
+}
+
+#define AGAIL_INSTANTIATE(S)                                                               \
+  template void multiply<S>(const ConstView<S>&, const ConstView<S>&, View<S>, bool);      \
+  template void multiply_transposed<S>(const ConstView<S>&, const ConstView<S>&, View<S>); \
+  template void multiply_by_transposed<S>(const ConstView<S>&, const ConstView<S>&, View<S>, bool);
+AGAIL_INSTANTIATE(float)
+AGAIL_INSTANTIATE(double)
+#undef AGAIL_INSTANTIATE
+
+}  // namespace agail

@@ -1,0 +1,87 @@
+#include "agail/nn/product.h"
+
+#include <gtest/gtest.h>
+
+#include <tuple>
+
+namespace agail {
+namespace {
+
+// One of the products on random factors of shape m, k, n, all of them blocks within larger
+// matrices, against Eigen in double precision.
+template <class S>
+class Case {
+ public:
+  Case(Index m, Index k, Index n) : m_(m), k_(k), n_(n) {
+    c_ = Matrix<S>::Random(m + kMargin, n + 1);
+  }
+
+  enum Kind { kPlain, kLeftTransposed, kRightTransposed };
+
+  void check(Kind kind, bool add) {
+    const auto [a_rows, a_cols] = kind == kLeftTransposed ? std::tuple(k_, m_) : std::tuple(m_, k_);
+    const auto [b_rows, b_cols] =
+        kind == kRightTransposed ? std::tuple(n_, k_) : std::tuple(k_, n_);
+    // The left factor ends where its memory ends, so that a sanitizer sees a read past it.
+    const Matrix<S> a = Matrix<S>::Random(a_rows, a_cols);
+    const Matrix<S> b = Matrix<S>::Random(b_rows + 3, b_cols);
+    const Matrix<S> before = c_;
+    View<S> c = c_.block(0, 0, m_, n_);
+    const auto right = b.topRows(b_rows);
+    if (kind == kPlain) multiply<S>(a, right, c, add);
+    if (kind == kLeftTransposed) multiply_transposed<S>(a, right, c);
+    if (kind == kRightTransposed) multiply_by_transposed<S>(a, right, c, add);
+
+    const Matrix<double> left = kind == kLeftTransposed
+                                    ? Matrix<double>(a.template cast<double>().transpose())
+                                    : Matrix<double>(a.template cast<double>());
+    const Matrix<double> other = kind == kRightTransposed
+                                     ? Matrix<double>(right.template cast<double>().transpose())
+                                     : Matrix<double>(right.template cast<double>());
+    Matrix<double> expected = left * other;
+    if (add) expected += before.block(0, 0, m_, n_).template cast<double>();
+    const double tolerance =
+        static_cast<double>(Eigen::NumTraits<S>::epsilon()) * static_cast<double>(k_ + 2);
+    EXPECT_LE((c_.block(0, 0, m_, n_).template cast<double>() - expected).cwiseAbs().maxCoeff(),
+              tolerance)
+        << m_ << " x " << k_ << " x " << n_ << " kind " << kind << " add " << add;
+    EXPECT_EQ(c_.bottomRows(kMargin), before.bottomRows(kMargin)) << "wrote past the rows";
+    EXPECT_EQ(c_.col(n_), before.col(n_)) << "wrote past the columns";
+  }
+
+ private:
+  static constexpr Index kMargin = 20;
+  Index m_, k_, n_;
+  Matrix<S> c_;
+};
+
+template <class S>
+void check_shapes() {
+  for (const Index m : {1, 3, 7, 8, 15, 16, 17, 31, 33, 64, 100, 113, 130})
+    for (const Index k : {1, 12, 101, 256, 300})
+      for (const Index n : {1, 2, 5, 13, 64}) {
+        Case<S> shape(m, k, n);
+        for (const bool add : {false, true}) {
+          shape.check(Case<S>::kPlain, add);
+          shape.check(Case<S>::kRightTransposed, add);
+        }
+        shape.check(Case<S>::kLeftTransposed, false);
+      }
+}
+
+TEST(Product, EqualsEigensForAllShapesInSinglePrecision) { check_shapes<float>(); }
+TEST(Product, EqualsEigensForAllShapesInDoublePrecision) { check_shapes<double>(); }
+
+TEST(Product, SameBitsForAColumnAloneAndAmongOthers) {
+  const Matrix<float> a = Matrix<float>::Random(100, 101);
+  const Matrix<float> b = Matrix<float>::Random(101, 64);
+  Matrix<float> together(100, 64), alone(100, 1);
+  multiply<float>(a, b, together);
+  for (Index j = 0; j < b.cols(); ++j) {
+    multiply<float>(a, b.middleCols(j, 1), alone);
+    EXPECT_EQ(alone.col(0), together.col(j)) << "column " << j;
+  }
+}
+
+}  // namespace
+}  // namespace agail
