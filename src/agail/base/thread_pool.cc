@@ -20,10 +20,10 @@ void pause() {
 }
 
 // Waits until `value` is no longer `old`: jobs follow each other closely, so a short spin (some
-// tens of microseconds) usually saves the two system calls; then it sleeps.
+// microseconds) often saves the two system calls; then it sleeps and leaves the core to others.
 template <class T>
 void wait_while_equal(const std::atomic<T>& value, T old) {
-  for (int spin = 0; spin < 1000; ++spin) {
+  for (int spin = 0; spin < 500; ++spin) {
     if (value.load(std::memory_order_acquire) != old) return;
     pause();
   }
@@ -59,34 +59,42 @@ void ThreadPool::run_erased(int tasks, Call call, void* function) {
   AGAIL_CHECK(!running_.exchange(true));
   call_ = call;
   function_ = function;
-  tasks_ = tasks;
-  next_task_.store(0, std::memory_order_relaxed);
-  const bool alone = workers_.empty() || tasks == 1;
-  if (!alone) {
-    busy_workers_.store(static_cast<int>(workers_.size()), std::memory_order_relaxed);
+  unfinished_.store(tasks, std::memory_order_relaxed);
+  tickets_.store(static_cast<std::uint64_t>(tasks) << 32, std::memory_order_release);
+  if (!workers_.empty() && tasks > 1) {
     job_number_.fetch_add(1, std::memory_order_release);
     job_number_.notify_all();
   }
   take_tasks(0);
-  if (!alone)
-    for (int busy = 0; (busy = busy_workers_.load(std::memory_order_acquire)) != 0;)
-      wait_while_equal(busy_workers_, busy);
+  for (int left = 0; (left = unfinished_.load(std::memory_order_acquire)) != 0;)
+    wait_while_equal(unfinished_, left);
   running_ = false;
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
 }
 
 void ThreadPool::work(int worker) {
-  for (unsigned seen = 0;; ++seen) {
+  for (unsigned seen = 0;;) {
     wait_while_equal(job_number_, seen);
+    seen = job_number_.load(std::memory_order_acquire);
     if (stopping_) return;
     take_tasks(worker);
-    if (busy_workers_.fetch_sub(1, std::memory_order_acq_rel) == 1) busy_workers_.notify_one();
+  }
+}
+
+bool ThreadPool::take_task(int& task) {
+  std::uint64_t tickets = tickets_.load(std::memory_order_acquire);
+  for (;;) {
+    const auto next = static_cast<std::uint32_t>(tickets);
+    if (next >= tickets >> 32) return false;
+    task = static_cast<int>(next);
+    if (tickets_.compare_exchange_weak(tickets, tickets + 1, std::memory_order_acq_rel))
+      return true;
   }
 }
 
 void ThreadPool::take_tasks(int worker) {
   int task = 0;
-  while ((task = next_task_.fetch_add(1, std::memory_order_relaxed)) < tasks_) {
+  while (take_task(task)) {
     try {
       call_(function_, task, worker);
     } catch (...) {
@@ -96,6 +104,8 @@ void ThreadPool::take_tasks(int worker) {
         failed_task_ = task;
       }
     }
+    if (unfinished_.fetch_sub(1, std::memory_order_acq_rel) == 1 && worker != 0)
+      unfinished_.notify_one();
   }
 }
 

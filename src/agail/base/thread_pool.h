@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <exception>
 #include <memory>
 #include <mutex>
@@ -43,15 +44,19 @@ class ThreadPool {
   void run_erased(int tasks, Call call, void* function);
   void work(int worker);
   void take_tasks(int worker);
+  bool take_task(int& task);
 
-  // The job. Written by run() before `job_number_` announces it, read by workers after that.
+  // The job. Written by run() before `tickets_` offers its tasks; whoever took a task may read it,
+  // since run() returns only when every task that was taken is done.
   Call call_ = nullptr;
   void* function_ = nullptr;
-  int tasks_ = 0;
 
-  alignas(64) std::atomic<unsigned> job_number_{0};
-  alignas(64) std::atomic<int> next_task_{0};
-  alignas(64) std::atomic<int> busy_workers_{0};
+  // Tasks on offer: how many the job has (high half) and which is next (low half), in one word, so
+  // that a worker who wakes up late finds either a task of the job under way or none. run() never
+  // waits for a worker that has taken nothing: on a busy machine that would be a time slice.
+  alignas(64) std::atomic<std::uint64_t> tickets_{0};
+  alignas(64) std::atomic<int> unfinished_{0};
+  alignas(64) std::atomic<unsigned> job_number_{0};  // what idle workers wait for
   std::atomic<bool> stopping_{false};
   std::atomic<bool> running_{false};
 
