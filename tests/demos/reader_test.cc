@@ -152,7 +152,7 @@ TEST(Reader, RefusesWhatDoesNotFit) {
   const auto broken = [](const std::function<void(Plain&)>& change) {
     Plain plain;
     change(plain);
-    const std::string error = plain.error();
+    std::string error = plain.error();
     EXPECT_THAT(error, AllOf(HasSubstr("demos.hdf5"), Not(HasSubstr("\n"))));
     return error;
   };

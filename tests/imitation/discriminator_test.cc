@@ -9,7 +9,6 @@
 namespace agail {
 namespace {
 
-using reference::Dual;
 using reference::numbers;
 using reference::relative_error;
 

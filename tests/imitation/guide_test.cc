@@ -191,8 +191,8 @@ TEST_P(GuideTest, LearnsATableOfActions) {
 
     // E log Q on held-out actions: minus the demonstrator's entropy.
     double entropy = 0;
-    for (Index s = 0; s < kStates; ++s)
-      for (Index a = 0; a < 3; ++a) entropy -= kTable[s][a] * std::log(kTable[s][a]) / 3;
+    for (const auto& probabilities : kTable)
+      for (const double p : probabilities) entropy -= p * std::log(p) / 3;
     EXPECT_NEAR(report.held_out_log_likelihood, -entropy, 0.1);
 
     const auto value = [&](double p) { return reward == "likelihood" ? p : std::log(p); };

@@ -185,7 +185,7 @@ TEST(Mlp, InitialWeightsAreUniformAndBiasesZero) {
   EXPECT_GE(first.minCoeff(), -bound);
   // The variance of a uniform number is bound^2 / 3, that of its square's mean known.
   EXPECT_NEAR(first.squaredNorm() / 2400, 1.0 / 12, 5 * (1.0 / 12) * std::sqrt(0.8 / 2400));
-  EXPECT_EQ(theta.segment(12 * 200, 200).cwiseAbs().maxCoeff(), 0);
+  EXPECT_EQ(theta.segment(Index{12} * 200, 200).cwiseAbs().maxCoeff(), 0);
   const auto last = theta.segment(mlp.offset(1), 600);
   EXPECT_LE(last.cwiseAbs().maxCoeff(), 0.01 * std::sqrt(3.0 / 200));
   EXPECT_GT(last.cwiseAbs().maxCoeff(), 0.009 * std::sqrt(3.0 / 200));
