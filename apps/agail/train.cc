@@ -1,9 +1,11 @@
 // agail train: a policy from an environment's reward, or from demonstrations.
+#include <algorithm>
 #include <iostream>
 #include <memory>
 
 #include "agail/base/nearest.h"
 #include "agail/base/thread_pool.h"
+#include "agail/comm/launch.h"
 #include "agail/comm/together.h"
 #include "agail/config/resolve.h"
 #include "agail/config/settings_reference.h"
@@ -50,7 +52,9 @@ TrainingTask make_task(const Options& options, bool preset_given, bool first_ran
   task.settings = resolve_settings(source_of(options, preset_given));
   task.settings_toml = to_toml(task.settings);
   task.seed = options.seed;
-  task.threads = options.threads > 0 ? options.threads : default_threads();
+  task.threads = options.threads > 0
+                     ? options.threads
+                     : std::max(1, default_threads() / ranks_on_this_machine());
   if (!options.demos.empty()) task.demonstrations = read_demonstrations(options.demos);
   if (task.demonstrations && !task.demonstrations->environment.empty() &&
       task.demonstrations->environment != options.environment && first_rank)
@@ -100,7 +104,7 @@ void add_train(CLI::App& app, Communicator& communicator) {
   command->add_option("--seed", options->seed, "Names all random numbers")
       ->check(CLI::NonNegativeNumber);
   command
-      ->add_option("--threads", options->threads, "Default: the cores of this machine or container")
+      ->add_option("--threads", options->threads, "Of each rank; default: the cores of this machine or container")
       ->check(CLI::Range(1, 4096));
   command->add_option("--lanes", options->lanes, "Environments that collect a batch side by side")
       ->check(CLI::PositiveNumber);

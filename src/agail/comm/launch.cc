@@ -1,5 +1,6 @@
 #include "agail/comm/launch.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <initializer_list>
 
@@ -25,6 +26,12 @@ int launched_ranks() {
 }
 
 }  // namespace
+
+int ranks_on_this_machine() {
+  if (launched_rank() < 0) return 1;
+  return std::max(1, number_of({"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS",
+                                "SLURM_STEP_TASKS_PER_NODE"}));
+}
 
 bool is_first_rank() { return launched_rank() <= 0; }
 

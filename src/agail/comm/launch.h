@@ -14,4 +14,7 @@ std::unique_ptr<Communicator> join_ranks();
 // Whether the launcher gave this process rank 0; true without a launcher. Needs no communicator.
 bool is_first_rank();
 
+// Ranks that the launcher started on this machine; 1 without a launcher.
+int ranks_on_this_machine();
+
 }  // namespace agail
