@@ -143,7 +143,7 @@ def update(task, ranks):
     minibatches = t.value_epochs * -(-n // t.value_minibatch)
     return {
         "batch": allgather(batch, ranks),
-        "values and rewards": gather(n, ranks) * (1 + t.reward_sums) + gather(finals, ranks),
+        "values and rewards": gather(n, ranks) * (1 + t.reward_sums) + gather(t.lanes, ranks),
         "gradient": tree_sum(n, t.policy_parameters, 4, ranks),
         "conjugate gradients": tree_sum(fisher, t.policy_parameters, 4, ranks)
         * (t.cg_iterations + 1),
