@@ -52,9 +52,8 @@ TrainingTask make_task(const Options& options, bool preset_given, bool first_ran
   task.settings = resolve_settings(source_of(options, preset_given));
   task.settings_toml = to_toml(task.settings);
   task.seed = options.seed;
-  task.threads = options.threads > 0
-                     ? options.threads
-                     : std::max(1, default_threads() / ranks_on_this_machine());
+  task.threads = options.threads > 0 ? options.threads
+                                     : std::max(1, default_threads() / ranks_on_this_machine());
   if (!options.demos.empty()) task.demonstrations = read_demonstrations(options.demos);
   if (task.demonstrations && !task.demonstrations->environment.empty() &&
       task.demonstrations->environment != options.environment && first_rank)
@@ -104,7 +103,8 @@ void add_train(CLI::App& app, Communicator& communicator) {
   command->add_option("--seed", options->seed, "Names all random numbers")
       ->check(CLI::NonNegativeNumber);
   command
-      ->add_option("--threads", options->threads, "Of each rank; default: the cores of this machine or container")
+      ->add_option("--threads", options->threads,
+                   "Of each rank; default: the cores of this machine or container")
       ->check(CLI::Range(1, 4096));
   command->add_option("--lanes", options->lanes, "Environments that collect a batch side by side")
       ->check(CLI::PositiveNumber);

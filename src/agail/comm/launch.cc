@@ -29,8 +29,8 @@ int launched_ranks() {
 
 int ranks_on_this_machine() {
   if (launched_rank() < 0) return 1;
-  return std::max(1, number_of({"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS",
-                                "SLURM_STEP_TASKS_PER_NODE"}));
+  return std::max(
+      1, number_of({"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_TASKS_PER_NODE"}));
 }
 
 bool is_first_rank() { return launched_rank() <= 0; }
