@@ -7,6 +7,8 @@
 #include <span>
 
 #include "agail/base/crc32c.h"
+#include "agail/comm/collectives.h"
+#include "agail/comm/together.h"
 #include "agail/config/resolve.h"
 #include "agail/demos/mask.h"
 #include "agail/train/evaluation.h"
@@ -55,16 +57,19 @@ TrainingTask make_task(const Options& options, const std::string& environment) {
 
 // Alternates: an update of training, then the same actions replayed by a second collector from the
 // same state.
-ordered_json measure(const Options& options, const std::string& environment) {
-  Trainer trainer(make_task(options, environment));
+ordered_json measure(const Options& options, Trainer& trainer) {
+  const std::string& environment = trainer.task().environment;
+  Communicator& communicator = trainer.team().communicator();
   ThreadPool replay_pool(options.threads);
   Collector replayed(environment, trainer.task().settings.run.lanes, trainer.task().seed,
-                     replay_pool);
+                     Team(replay_pool, communicator));
+  Traffic traffic;  // of the updates, not of copying the state or of what follows here
   constexpr int kWarmUp = 3;
   double training = 0, stepping = 0;
   std::array<double, static_cast<std::size_t>(Phase::kCount)> before{};
   for (int i = 0; i < kWarmUp + options.updates; ++i) {
     if (i == kWarmUp) {
+      traffic = {};
       training = stepping = 0;
       for (std::size_t p = 0; p < before.size(); ++p)
         before[p] = trainer.stopwatch().seconds(static_cast<Phase>(p));
@@ -75,11 +80,16 @@ ordered_json measure(const Options& options, const std::string& environment) {
     Archive loading(state, Archive::Mode::kLoad);
     replayed.archive(loading);
 
+    const Traffic before_update = communicator.traffic();
     Clock::time_point start = Clock::now();
     trainer.update();
     training += seconds_since(start);
+    traffic.messages += communicator.traffic().messages - before_update.messages;
+    traffic.bytes += communicator.traffic().bytes - before_update.bytes;
+    traffic.seconds += communicator.traffic().seconds - before_update.seconds;
     start = Clock::now();
     replayed.replay(trainer.batch());
+    largest(communicator, 0);  // the slowest rank's time counts
     stepping += seconds_since(start);
   }
   const double samples =
@@ -100,24 +110,37 @@ ordered_json measure(const Options& options, const std::string& environment) {
   const std::span bytes(theta, static_cast<std::size_t>(policy.theta().size()) * sizeof(float));
   char signature[16];
   std::snprintf(signature, sizeof signature, "%08x", crc32c(bytes));
-  return {{"environment", environment},
-          {"method", options.method},
-          {"preset", options.preset},
-          {"samples", samples},
-          {"threads", options.threads},
-          {"stepping_us", microseconds(stepping)},
-          {"training_us", microseconds(training)},
-          {"ratio", training / stepping},
-          {"split_us", split},
-          {"signature", signature}};
+  ordered_json result = {{"environment", environment},
+                         {"method", options.method},
+                         {"preset", options.preset},
+                         {"samples", samples},
+                         {"threads", options.threads},
+                         {"stepping_us", microseconds(stepping)},
+                         {"training_us", microseconds(training)},
+                         {"ratio", training / stepping},
+                         {"split_us", split},
+                         {"signature", signature}};
+  if (communicator.ranks() == 1) return result;
+  const Traffic total = total_of(communicator, traffic);
+  const auto updates = static_cast<double>(options.updates);
+  result["ranks"] = communicator.ranks();
+  result["parameters"] = policy.theta().size();
+  result["traffic_an_update"] = {{"messages", static_cast<double>(total.messages) / updates},
+                                 {"bytes", static_cast<double>(total.bytes) / updates},
+                                 {"seconds_of_rank_0", traffic.seconds / updates}};
+  return result;
 }
 
-void run(Options options) {
+void run(Options options, Communicator& communicator) {
   if (options.environments.empty())
     options.environments = {"Hopper-v5", "Walker2d-v5", "Humanoid-v4"};
   ordered_json results = ordered_json::array();
   for (const std::string& environment : options.environments) {
-    results.push_back(measure(options, environment));
+    std::unique_ptr<Trainer> trainer;
+    together(communicator, [&] {
+      trainer = std::make_unique<Trainer>(make_task(options, environment), communicator);
+    });
+    or_abort(communicator, [&] { results.push_back(measure(options, *trainer)); });
     if (options.json) continue;
     const ordered_json& result = results.back();
     std::printf(
@@ -128,6 +151,10 @@ void run(Options options) {
         result["ratio"].get<double>(), result["signature"].get<std::string>().c_str());
     for (const auto& [name, value] : result["split_us"].items())
       std::printf("  %-20s %8.3f us\n", name.c_str(), value.get<double>());
+    if (result.contains("traffic_an_update"))
+      std::printf("  %d ranks sent %.0f messages, %.0f bytes an update\n", communicator.ranks(),
+                  result["traffic_an_update"]["messages"].get<double>(),
+                  result["traffic_an_update"]["bytes"].get<double>());
     std::fflush(stdout);
   }
   if (options.json) std::cout << results.dump(2) << "\n";
@@ -135,7 +162,7 @@ void run(Options options) {
 
 }  // namespace
 
-void add_bench(CLI::App& app) {
+void add_bench(CLI::App& app, Communicator& communicator) {
   CLI::App* command =
       app.add_subcommand("bench", "Measure training against pure stepping of the physics");
   const auto options = std::make_shared<Options>();
@@ -149,7 +176,7 @@ void add_bench(CLI::App& app) {
       ->check(CLI::PositiveNumber);
   command->add_option("--threads", options->threads, "Default 1")->check(CLI::Range(1, 4096));
   command->add_flag("--json", options->json, "Print JSON");
-  command->callback([options] { run(*options); });
+  command->callback([options, &communicator] { run(*options, communicator); });
 }
 
 }  // namespace agail

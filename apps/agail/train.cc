@@ -1,9 +1,12 @@
 // agail train: a policy from an environment's reward, or from demonstrations.
+#include <algorithm>
 #include <iostream>
 #include <memory>
 
 #include "agail/base/nearest.h"
 #include "agail/base/thread_pool.h"
+#include "agail/comm/launch.h"
+#include "agail/comm/together.h"
 #include "agail/config/resolve.h"
 #include "agail/config/settings_reference.h"
 #include "agail/demos/minari_reader.h"
@@ -38,7 +41,7 @@ SettingsSource source_of(const Options& options, bool preset_given) {
   return source;
 }
 
-void run(const Options& options, bool preset_given) {
+TrainingTask make_task(const Options& options, bool preset_given, bool first_rank) {
   if (std::find(kMethods.begin(), kMethods.end(), options.method) == kMethods.end())
     throw InputError("--method " + options.method + ": no such method; did you mean '" +
                      nearest(options.method, kMethods) + "'? (trpo gail state-gail agail bc)");
@@ -49,16 +52,25 @@ void run(const Options& options, bool preset_given) {
   task.settings = resolve_settings(source_of(options, preset_given));
   task.settings_toml = to_toml(task.settings);
   task.seed = options.seed;
-  task.threads = options.threads > 0 ? options.threads : default_threads();
+  task.threads = options.threads > 0 ? options.threads
+                                     : std::max(1, default_threads() / ranks_on_this_machine());
   if (!options.demos.empty()) task.demonstrations = read_demonstrations(options.demos);
   if (task.demonstrations && !task.demonstrations->environment.empty() &&
-      task.demonstrations->environment != options.environment)
+      task.demonstrations->environment != options.environment && first_rank)
     std::cerr << "agail: note: the demonstrations are of " << task.demonstrations->environment
               << ", training is on " << options.environment << "\n";
+  return task;
+}
 
-  const RunOutcome outcome = run_training(std::move(task), options.out, options.resume);
+void run(const Options& options, bool preset_given, Communicator& communicator) {
+  const bool first_rank = communicator.rank() == 0;
+  TrainingTask task;
+  together(communicator, [&] { task = make_task(options, preset_given, first_rank); });
+  const RunOutcome outcome =
+      run_training(std::move(task), options.out, options.resume, communicator);
   if (outcome.signal != 0) {
-    std::cerr << "agail: stopped at " << outcome.timesteps << " steps; go on with --resume\n";
+    if (first_rank)
+      std::cerr << "agail: stopped at " << outcome.timesteps << " steps; go on with --resume\n";
     throw Interrupted{outcome.signal};
   }
   const std::optional<Evaluation>& shown = outcome.best ? outcome.best : outcome.last;
@@ -71,7 +83,7 @@ void run(const Options& options, bool preset_given) {
 
 }  // namespace
 
-void add_train(CLI::App& app) {
+void add_train(CLI::App& app, Communicator& communicator) {
   CLI::App* command = app.add_subcommand("train", "Train a policy");
   const auto options = std::make_shared<Options>();
   command->add_option("ENV", options->environment, "Environment id, see agail envs")->required();
@@ -91,7 +103,8 @@ void add_train(CLI::App& app) {
   command->add_option("--seed", options->seed, "Names all random numbers")
       ->check(CLI::NonNegativeNumber);
   command
-      ->add_option("--threads", options->threads, "Default: the cores of this machine or container")
+      ->add_option("--threads", options->threads,
+                   "Of each rank; default: the cores of this machine or container")
       ->check(CLI::Range(1, 4096));
   command->add_option("--lanes", options->lanes, "Environments that collect a batch side by side")
       ->check(CLI::PositiveNumber);
@@ -108,7 +121,8 @@ void add_train(CLI::App& app) {
   };
   print_and_exit("--help-settings", settings_help, "Print every setting and exit");
   print_and_exit("--help-settings-markdown", settings_markdown, "The same as the reference page");
-  command->callback([options, preset] { run(*options, preset->count() > 0); });
+  command->callback(
+      [options, preset, &communicator] { run(*options, preset->count() > 0, communicator); });
 }
 
 }  // namespace agail

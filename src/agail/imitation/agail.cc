@@ -24,7 +24,7 @@ std::vector<Index> columns_for(const std::string& method, const DemoData& demos)
 
 AdversarialReward::AdversarialReward(const std::string& method, const DemoData& demos,
                                      const ActionSpace& action, double missing_ratio,
-                                     const Settings& settings, ThreadPool& pool, Index capacity,
+                                     const Settings& settings, Team team, Index capacity,
                                      std::uint64_t seed)
     : demos_(demos),
       action_(action),
@@ -32,7 +32,7 @@ AdversarialReward::AdversarialReward(const std::string& method, const DemoData& 
       beta_(settings.reward.beta.value_or(1 - missing_ratio)),
       demo_columns_(columns_for(method, demos)),
       discriminator_(static_cast<int>(demos.states.rows()), action, method == "gail",
-                     settings.discriminator, settings.policy.observation_clip, pool, capacity,
+                     settings.discriminator, settings.policy.observation_clip, team, capacity,
                      seed),
       executed_(Matrix<float>::Zero(action.dim, capacity)),
       guide_rewards_(Vector<float>::Zero(capacity)) {
@@ -40,7 +40,7 @@ AdversarialReward::AdversarialReward(const std::string& method, const DemoData& 
   if (method == "agail" && beta_ > 0 && !demos.some_action.empty())
     guide_ =
         std::make_unique<Guide>(demos, action, settings.guide, settings.discriminator.minibatch,
-                                settings.policy.observation_clip, pool, capacity, seed);
+                                settings.policy.observation_clip, team, capacity, seed);
 }
 
 // Algorithm 1 of the paper, for one batch of trajectories tau ~ pi:

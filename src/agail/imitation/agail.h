@@ -26,8 +26,8 @@ class AdversarialReward {
  public:
   // method: agail | state-gail | gail. Throws InputError if gail finds no complete step.
   AdversarialReward(const std::string& method, const DemoData& demos, const ActionSpace& action,
-                    double missing_ratio, const Settings& settings, ThreadPool& pool,
-                    Index capacity, std::uint64_t seed);
+                    double missing_ratio, const Settings& settings, Team team, Index capacity,
+                    std::uint64_t seed);
 
   // One update of Algorithm 1, up to the policy's step. `update` numbers the batches. Fills
   // rewards[0, n).

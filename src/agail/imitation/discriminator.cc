@@ -108,13 +108,13 @@ template class DiscriminatorLoss<float>;
 template class DiscriminatorLoss<double>;
 
 Discriminator::Discriminator(int observation_dim, const ActionSpace& action, bool with_actions,
-                             const DiscriminatorSettings& settings, double clip, ThreadPool& pool,
+                             const DiscriminatorSettings& settings, double clip, Team team,
                              Index capacity, std::uint64_t seed)
     : settings_(settings),
       action_(action),
       with_actions_(with_actions),
       features_(all_or(settings.features, observation_dim)),
-      pool_(pool),
+      team_(team),
       seed_(seed),
       normalizer_(static_cast<Index>(features_.size()), settings.normalize_observations, clip),
       mlp_(layer_sizes(normalizer_.size() + (with_actions ? action.encoded_dim() : 0),
@@ -122,7 +122,7 @@ Discriminator::Discriminator(int observation_dim, const ActionSpace& action, boo
            Activation::kTanh),
       theta_(Vector<float>::Zero(mlp_.parameters())),
       adam_(mlp_.parameters()),
-      loss_(mlp_, settings, pool),
+      loss_(mlp_, settings, team.pool()),
       reward_tape_(mlp_.make_tape(capacity)),
       inputs_(Matrix<float>::Zero(padded(mlp_.inputs() + 1), capacity)),
       minibatch_(Matrix<float>::Zero(padded(mlp_.inputs() + 1), 2 * settings.minibatch)),
@@ -171,7 +171,7 @@ DiscriminatorReport Discriminator::learn(const Samples& policy, const Samples& d
       new_states_(i, 2 * k) = policy.states(feature, policy_column(k));
       new_states_(i, 2 * k + 1) = demos.states(feature, demo_column(k));
     }
-  normalizer_.update(pool_, new_states_);
+  normalizer_.update(team_.pool(), new_states_);
 
   DiscriminatorReport report;
   const double share = 1.0 / static_cast<double>(settings_.minibatches);
@@ -198,7 +198,7 @@ DiscriminatorReport Discriminator::learn(const Samples& policy, const Samples& d
 void Discriminator::rewards(const Samples& policy, Vector<float>& rewards) {
   const std::string& form = settings_.reward;
   const int kind = form == "softplus" ? 0 : form == "log-odds" ? 1 : form == "probability" ? 2 : 3;
-  for_each_chunk(pool_, policy.n, [&](int, Index first, Index n) {
+  for_each_chunk(team_, policy.n, [&](int, Index first, Index n) {
     for (Index j = first; j < first + n; ++j) build_input(policy, j, inputs_.col(j).data());
     mlp_.forward(theta_.data(), inputs_.block(0, first, mlp_.inputs() + 1, n), reward_tape_, first);
     for (Index j = first; j < first + n; ++j) {
@@ -206,6 +206,7 @@ void Discriminator::rewards(const Samples& policy, Vector<float>& rewards) {
       rewards[j] = kind == 0 ? softplus(d) : kind == 1 ? d : kind == 2 ? sigmoid(d) : -softplus(-d);
     }
   });
+  gather_chunks(team_, policy.n, rewards);
 }
 
 void Discriminator::archive(Archive& a) {

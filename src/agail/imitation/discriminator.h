@@ -56,8 +56,8 @@ class Discriminator {
  public:
   // Sees settings.features of the state (all if empty) and, if `with_actions`, the encoded action.
   Discriminator(int observation_dim, const ActionSpace& action, bool with_actions,
-                const DiscriminatorSettings& settings, double clip, ThreadPool& pool,
-                Index capacity, std::uint64_t seed);
+                const DiscriminatorSettings& settings, double clip, Team team, Index capacity,
+                std::uint64_t seed);
 
   // Samples as the discriminator takes them. states: observation_dim x n; actions: action_dim x n
   // (executed), ignored if it does not see them.
@@ -85,7 +85,7 @@ class Discriminator {
   ActionSpace action_;
   bool with_actions_;
   std::vector<Index> features_;
-  ThreadPool& pool_;
+  Team team_;
   std::uint64_t seed_;
   Normalizer normalizer_;  // of the features; actions are seen as they are
   Mlp<float> mlp_;

@@ -86,11 +86,11 @@ template class GuideNetwork<float>;
 template class GuideNetwork<double>;
 
 Guide::Guide(const DemoData& demos, const ActionSpace& action, const GuideSettings& settings,
-             Index minibatch, double clip, ThreadPool& pool, Index capacity, std::uint64_t seed)
+             Index minibatch, double clip, Team team, Index capacity, std::uint64_t seed)
     : demos_(demos),
       action_(action),
       settings_(settings),
-      pool_(pool),
+      team_(team),
       seed_(seed),
       minibatch_(minibatch),
       network_(demos.states.rows(), action, settings.hidden, settings.target != "own"),
@@ -113,8 +113,8 @@ Guide::Guide(const DemoData& demos, const ActionSpace& action, const GuideSettin
   AGAIL_CHECK(!demos.some_action.empty());
   RandomStream random(seed, Purpose::kInitialise, 3);
   network_.initialise(theta_.data(), random);
-  for (int i = 0; i < pool.threads(); ++i) scratch_.push_back(network_.mlp.make_scratch());
-  normalizer_.update(pool, demos.states);
+  for (int i = 0; i < team.pool().threads(); ++i) scratch_.push_back(network_.mlp.make_scratch());
+  normalizer_.update(team.pool(), demos.states);
 
   std::vector<Index> columns = demos.some_action;
   RandomStream order(seed, Purpose::kHoldout, 3);
@@ -142,7 +142,7 @@ void Guide::show_policy(const PolicyView& policy, const float* state, Index slot
 
 void Guide::run_policy(const PolicyView& policy, Index slots) {
   const Mlp<float>& mlp = policy.network.mlp;
-  for_each_chunk(pool_, slots, [&](int, Index first, Index count) {
+  for_each_chunk(team_.pool(), slots, [&](int, Index first, Index count) {
     mlp.forward(policy.theta.data(), policy_input_.block(0, first, mlp.inputs() + 1, count),
                 policy_tape_, first);
   });
@@ -178,8 +178,8 @@ GuideReport Guide::learn(const PolicyView& policy, Index minibatches, std::uint3
       targets_.col(j) = demos_.actions.col(column);
       available_.col(j) = demos_.available.col(column);
     }
-    const double loss = network_.loss(pool_, sums_, scratch_, theta_, x_, targets_, available_,
-                                      minibatch_, tape_, gradient_);
+    const double loss = network_.loss(team_.pool(), sums_, scratch_, theta_, x_, targets_,
+                                      available_, minibatch_, tape_, gradient_);
     adam_.descend(theta_, gradient_, settings_.learning_rate);
     auto log_std = theta_.tail(network_.distribution.log_stds());
     log_std = log_std.cwiseMax(kLogStdFloor);
@@ -216,7 +216,7 @@ Index Guide::target_column(const float* state, RandomStream& random) const {
 
 void Guide::rewards(const Matrix<float>& states, const Matrix<float>& actions, Index n,
                     std::uint32_t update, Vector<float>& rewards) {
-  for_each_chunk(pool_, n, [&](int, Index first, Index count) {
+  for_each_chunk(team_, n, [&](int, Index first, Index count) {
     for (Index j = first; j < first + count; ++j)
       build_input(states.col(j).data(), actions.col(j).data(), reward_x_.col(j).data());
     network_.mlp.forward(theta_.data(), reward_x_.block(0, first, network_.mlp.inputs() + 1, count),
@@ -233,6 +233,7 @@ void Guide::rewards(const Matrix<float>& states, const Matrix<float>& actions, I
       }
     }
   });
+  gather_chunks(team_, n, rewards);
 }
 
 void Guide::diagnose(const PolicyView& policy, const Matrix<float>& states, Index n,
@@ -243,7 +244,7 @@ void Guide::diagnose(const PolicyView& policy, const Matrix<float>& states, Inde
 }
 
 void Guide::run_guide(Index columns) {
-  for_each_chunk(pool_, columns, [&](int, Index first, Index count) {
+  for_each_chunk(team_.pool(), columns, [&](int, Index first, Index count) {
     network_.mlp.forward(theta_.data(), reward_x_.block(0, first, network_.mlp.inputs() + 1, count),
                          tape_, first);
   });

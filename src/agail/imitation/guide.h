@@ -73,7 +73,7 @@ class Guide {
  public:
   // Needs at least one available action.
   Guide(const DemoData& demos, const ActionSpace& action, const GuideSettings& settings,
-        Index minibatch, double clip, ThreadPool& pool, Index capacity, std::uint64_t seed);
+        Index minibatch, double clip, Team team, Index capacity, std::uint64_t seed);
   ~Guide();
 
   // `minibatches` steps of Adam. `update` numbers the call.
@@ -111,7 +111,7 @@ class Guide {
   const DemoData& demos_;
   ActionSpace action_;
   GuideSettings settings_;
-  ThreadPool& pool_;
+  Team team_;
   std::uint64_t seed_;
   Index minibatch_;
   GuideNetwork<float> network_;

@@ -5,10 +5,10 @@
 namespace agail {
 
 template <class S>
-PolicyObjective<S>::PolicyObjective(const PolicyNetwork<S>& network, ThreadPool& pool,
-                                    Index capacity, int fisher_stride)
+PolicyObjective<S>::PolicyObjective(const PolicyNetwork<S>& network, Team team, Index capacity,
+                                    int fisher_stride)
     : network_(network),
-      pool_(pool),
+      team_(team),
       fisher_stride_(fisher_stride),
       theta_old_(Vector<S>::Zero(network.parameters())),
       old_tape_(network.mlp.make_tape(capacity)),
@@ -20,7 +20,7 @@ PolicyObjective<S>::PolicyObjective(const PolicyNetwork<S>& network, ThreadPool&
       parameter_sums_(network.parameters(), capacity),
       scalar_sums_(3, capacity),
       gradient_(Vector<S>::Zero(network.parameters())) {
-  for (int i = 0; i < pool.threads(); ++i)
+  for (int i = 0; i < team.pool().threads(); ++i)
     workers_.push_back({network.mlp.make_scratch(),
                         Matrix<S>::Zero(padded(network.mlp.outputs()), kChunk),
                         RowVector<S>::Zero(kChunk)});
@@ -40,7 +40,7 @@ void PolicyObjective<S>::bind(const Vector<S>& theta_old, const Matrix<S>& x,
   const S* theta = theta_old_.data();
   const Index rows = mlp.inputs() + 1;
 
-  for_each_chunk(pool_, n, [&](int, Index first, Index count) {
+  for_each_chunk(team_, n, [&](int, Index first, Index count) {
     mlp.forward(theta, x.block(0, first, rows, count), old_tape_, first);
     network_.distribution.log_prob(mlp.output(old_tape_, first, count), network_.log_std(theta),
                                    actions.block(0, first, actions.rows(), count), nullptr,
@@ -48,7 +48,7 @@ void PolicyObjective<S>::bind(const Vector<S>& theta_old, const Matrix<S>& x,
   });
 
   fisher_n_ = (n + fisher_stride_ - 1) / fisher_stride_;
-  for_each_chunk(pool_, fisher_n_, [&](int, Index first, Index count) {
+  for_each_chunk(team_, fisher_n_, [&](int, Index first, Index count) {
     for (Index j = first; j < first + count; ++j)
       fisher_x_.col(j).head(rows) = x.col(j * fisher_stride_).head(rows);
     mlp.forward(theta, fisher_x_.block(0, first, rows, count), fisher_tape_, first);
@@ -60,7 +60,7 @@ const Vector<S>& PolicyObjective<S>::gradient() {
   const auto& mlp = network_.mlp;
   const S* theta = theta_old_.data();
   const S scale = S(1) / static_cast<S>(n_);
-  gradient_ = parameter_sums_.sum(pool_, n_, [&](Index, int w, Index first, Index count, S* out) {
+  gradient_ = parameter_sums_.sum(team_, n_, [&](Index, int w, Index first, Index count, S* out) {
     Worker& worker = workers_[static_cast<std::size_t>(w)];
     const auto x = x_->block(0, first, mlp.inputs() + 1, count);
     const auto output = mlp.output(old_tape_, first, count);
@@ -88,7 +88,7 @@ void PolicyObjective<S>::fisher_vector_product(const Vector<S>& v, Vector<S>& re
   const S scale = S(1) / static_cast<S>(fisher_n_);
   const Index log_stds = network_.distribution.log_stds();
   result =
-      parameter_sums_.sum(pool_, fisher_n_, [&](Index, int w, Index first, Index count, S* out) {
+      parameter_sums_.sum(team_, fisher_n_, [&](Index, int w, Index first, Index count, S* out) {
         Worker& worker = workers_[static_cast<std::size_t>(w)];
         const auto x = fisher_x_.block(0, first, mlp.inputs() + 1, count);
         View<S> tangent = worker.adjoint.block(0, 0, mlp.outputs(), count);
@@ -107,7 +107,7 @@ typename PolicyObjective<S>::Value PolicyObjective<S>::evaluate(const Vector<S>&
   const auto& mlp = network_.mlp;
   const auto& distribution = network_.distribution;
   const auto total =
-      scalar_sums_.sum(pool_, n_, [&](Index, int w, Index first, Index count, double* out) {
+      scalar_sums_.sum(team_, n_, [&](Index, int w, Index first, Index count, double* out) {
         Worker& worker = workers_[static_cast<std::size_t>(w)];
         mlp.forward(theta.data(), x_->block(0, first, mlp.inputs() + 1, count), new_tape_, first);
         const auto output = mlp.output(new_tape_, first, count);
@@ -130,7 +130,7 @@ typename PolicyObjective<S>::Value PolicyObjective<S>::evaluate(const Vector<S>&
 template <class S>
 typename PolicyObjective<S>::Value PolicyObjective<S>::evaluate_old() {
   const auto total =
-      scalar_sums_.sum(pool_, n_, [&](Index, int, Index first, Index count, double* out) {
+      scalar_sums_.sum(team_, n_, [&](Index, int, Index first, Index count, double* out) {
         out[0] = 0;
         for (Index j = 0; j < count; ++j) out[0] += static_cast<double>((*advantages_)[first + j]);
         out[1] = 0;

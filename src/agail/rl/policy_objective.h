@@ -16,8 +16,7 @@ template <class S>
 class PolicyObjective {
  public:
   // For batches of up to `capacity` samples; the Fisher matrix uses every `fisher_stride`-th.
-  PolicyObjective(const PolicyNetwork<S>& network, ThreadPool& pool, Index capacity,
-                  int fisher_stride);
+  PolicyObjective(const PolicyNetwork<S>& network, Team team, Index capacity, int fisher_stride);
 
   // Fixes theta_old and the batch. x: (observations + 1) x >= n with a last row of ones; actions:
   // as sampled; advantages: n. All must outlive the use of this object until the next bind.
@@ -43,7 +42,7 @@ class PolicyObjective {
   Value mean(const Eigen::Map<Vector<double>>& total) const;
 
   const PolicyNetwork<S>& network_;
-  ThreadPool& pool_;
+  Team team_;
   int fisher_stride_;
   Index n_ = 0, fisher_n_ = 0;
   S entropy_weight_ = 0;

@@ -22,10 +22,18 @@ void clip_action(const ActionSpace& space, const float* sampled, float* executed
     executed[i] = space.discrete ? sampled[i] : std::clamp(sampled[i], space.low[i], space.high[i]);
 }
 
-Collector::Collector(const std::string& environment, Index lanes, std::uint64_t seed,
-                     ThreadPool& pool)
-    : seed_(seed), pool_(pool), lanes_(static_cast<std::size_t>(lanes)) {
-  for (Lane& lane : lanes_) {
+Collector::Collector(const std::string& environment, Index lanes, std::uint64_t seed, Team team)
+    : seed_(seed),
+      team_(team),
+      own_(share_of(lanes, team.ranks(), team.rank())),
+      lanes_(static_cast<std::size_t>(lanes)) {
+  if (lanes < team.ranks())
+    throw InputError("setting run.lanes = " + std::to_string(lanes) + " is less than the " +
+                     std::to_string(team.ranks()) +
+                     " ranks, and each needs a lane; start fewer ranks, or give --lanes " +
+                     std::to_string(team.ranks()) + " or more");
+  for (Index l = own_.begin; l < own_.end; ++l) {
+    Lane& lane = lanes_[static_cast<std::size_t>(l)];
     lane.environment = make_environment(environment);
     lane.finished.reserve(4096);
   }
@@ -82,7 +90,7 @@ void Collector::collect_lane(Index index, const PolicyNetwork<float>& network,
                                                                     : Ending::kNone;
     if (result.diverged) ++lane.diverged;
     const bool done = result.terminated || result.truncated;
-    if (done || batch.lane_ends(j)) store(batch.final_observations, j);
+    if (batch.has_final_observation(j)) store(batch.final_observations, j);
     if (done) {
       lane.finished.push_back(
           {lane.episode_return, static_cast<double>(environment.elapsed_steps())});
@@ -96,13 +104,14 @@ void Collector::collect_lane(Index index, const PolicyNetwork<float>& network,
 
 void Collector::collect(const PolicyNetwork<float>& network, const Vector<float>& theta,
                         const Normalizer& normalizer, Batch& batch, Stopwatch& stopwatch) {
-  while (workers_.size() < static_cast<std::size_t>(pool_.threads()))
+  while (workers_.size() < static_cast<std::size_t>(team_.pool().threads()))
     workers_.push_back({network.mlp.make_tape(1),
                         std::vector<float>(static_cast<std::size_t>(spec().action.dim))});
-  pool_.run(static_cast<int>(lanes_.size()), [&](int lane, int worker) {
-    collect_lane(lane, network, theta, normalizer, batch,
+  team_.pool().run(static_cast<int>(own_.size()), [&](int task, int worker) {
+    collect_lane(own_.begin + task, network, theta, normalizer, batch,
                  workers_[static_cast<std::size_t>(worker)]);
   });
+  if (team_.ranks() > 1) exchange_batch(normalizer, batch);
   batch.finished.clear();
   batch.diverged = 0;
   double physics = 0, inference = 0;
@@ -112,14 +121,15 @@ void Collector::collect(const PolicyNetwork<float>& network, const Vector<float>
     physics += lane.physics_seconds;
     inference += lane.inference_seconds;
   }
-  const auto threads = static_cast<double>(
-      std::min<std::size_t>(lanes_.size(), static_cast<std::size_t>(pool_.threads())));
+  // What other ranks measured is theirs: zero here.
+  const auto threads = static_cast<double>(std::min<Index>(own_.size(), team_.pool().threads()));
   stopwatch.move_to(Phase::kPhysics, physics / threads);
   stopwatch.move_to(Phase::kInference, inference / threads);
 }
 
 void Collector::replay(const Batch& batch) {
-  pool_.run(static_cast<int>(lanes_.size()), [&](int index, int) {
+  team_.pool().run(static_cast<int>(own_.size()), [&](int task, int) {
+    const Index index = own_.begin + task;
     Lane& lane = lanes_[static_cast<std::size_t>(index)];
     std::vector<float> executed(static_cast<std::size_t>(spec().action.dim));
     if (lane.episode < 0) start_episode(index);
@@ -134,16 +144,20 @@ void Collector::replay(const Batch& batch) {
 }
 
 void Collector::archive(Archive& a) {
+  std::vector<LaneState> states(lanes_.size());
+  if (!a.loading()) save_lanes(states);
   for (std::size_t i = 0; i < lanes_.size(); ++i) {
-    Lane& lane = lanes_[i];
+    LaneState& state = states[i];
     a.scope(std::to_string(i), [&](Archive& inner) {
-      std::vector<double> state;
-      if (!inner.loading() && lane.episode >= 0) state = lane.environment->save();
-      inner.resizable("environment", state);
-      inner("episode", lane.episode);
-      inner("episode_return", lane.episode_return);
-      if (inner.loading() && lane.episode >= 0) lane.environment->restore(state);
+      inner.resizable("environment", state.environment);
+      inner("episode", state.episode);
+      inner("episode_return", state.episode_return);
     });
+    Lane& lane = lanes_[i];
+    if (!a.loading() || !lane.environment) continue;
+    lane.episode = state.episode;
+    lane.episode_return = state.episode_return;
+    if (lane.episode >= 0) lane.environment->restore(state.environment);
   }
 }
 

@@ -7,6 +7,8 @@
 
 #include "agail/base/archive.h"
 #include "agail/base/stopwatch.h"
+#include "agail/comm/collectives.h"
+#include "agail/comm/team.h"
 #include "agail/env/environment.h"
 #include "agail/nn/normalizer.h"
 #include "agail/rl/policy_network.h"
@@ -28,6 +30,9 @@ struct Batch {
   Index lanes = 0, steps = 0;
   Index size() const { return lanes * steps; }
   bool lane_ends(Index column) const { return (column + 1) % steps == 0; }
+  bool has_final_observation(Index column) const {
+    return lane_ends(column) || endings[static_cast<std::size_t>(column)] != Ending::kNone;
+  }
 
   Matrix<float> observations;  // observation_dim x n
   Matrix<float>
@@ -46,12 +51,15 @@ void clip_action(const ActionSpace& space, const float* sampled, float* executed
 
 class Collector {
  public:
-  Collector(const std::string& environment, Index lanes, std::uint64_t seed, ThreadPool& pool);
+  // Ranks share the lanes; InputError if there are more ranks than lanes.
+  Collector(const std::string& environment, Index lanes, std::uint64_t seed, Team team);
 
-  const EnvironmentSpec& spec() const { return lanes_.front().environment->spec(); }
+  const EnvironmentSpec& spec() const {
+    return lanes_[static_cast<std::size_t>(own_.begin)].environment->spec();
+  }
 
-  // Fills the batch, each lane on one thread. The policy and the normaliser do not change
-  // meanwhile.
+  // Fills the batch, each lane on one thread of one rank. The policy and the normaliser do not
+  // change meanwhile.
   void collect(const PolicyNetwork<float>& network, const Vector<float>& theta,
                const Normalizer& normalizer, Batch& batch, Stopwatch& stopwatch);
 
@@ -59,13 +67,14 @@ class Collector {
   // physics without any learning or network, which is what training is measured against.
   void replay(const Batch& batch);
 
-  // Everything that the next batch depends on, the environments' state included.
+  // Everything that the next batch depends on, the environments' state included. When saving, all
+  // ranks must take part, and all get all lanes.
   void archive(Archive& a);
 
  private:
   struct Lane {
-    std::unique_ptr<Environment> environment;
-    std::int64_t episode = -1;  // number of the episode under way; -1: none yet
+    std::unique_ptr<Environment> environment;  // null: another rank's lane
+    std::int64_t episode = -1;                 // number of the episode under way; -1: none yet
     double episode_return = 0;
     std::vector<FinishedEpisode> finished;  // in the batch under way
     std::int64_t diverged = 0;
@@ -79,10 +88,24 @@ class Collector {
                     const Normalizer& normalizer, Batch& batch, Worker& worker);
   void start_episode(Index index);
 
+  // From every rank to every rank (rollout_exchange.cc): what the lanes collected, and their
+  // states.
+  struct LaneState {
+    std::vector<double> environment;
+    std::int64_t episode = -1;
+    double episode_return = 0;
+  };
+  void pack_batch(const Batch& batch);
+  void exchange_batch(const Normalizer& normalizer, Batch& batch);
+  void save_lanes(std::vector<LaneState>& states);
+
   std::uint64_t seed_;
-  ThreadPool& pool_;
+  Team team_;
+  Share own_;  // this rank's lanes
   std::vector<Lane> lanes_;
   std::vector<Worker> workers_;
+  Bytes message_;
+  Blocks all_;
 };
 
 }  // namespace agail

@@ -11,10 +11,10 @@ namespace {
 constexpr double kKlTolerance = 1.5;
 }  // namespace
 
-Trpo::Trpo(const PolicyNetwork<float>& network, ThreadPool& pool, const TrpoSettings& settings,
+Trpo::Trpo(const PolicyNetwork<float>& network, Team team, const TrpoSettings& settings,
            Index capacity)
     : settings_(settings),
-      objective_(network, pool, capacity, static_cast<int>(settings.fisher_stride)),
+      objective_(network, team, capacity, static_cast<int>(settings.fisher_stride)),
       solver_(network.parameters()),
       gradient_(Vector<float>::Zero(network.parameters())),
       step_(gradient_),

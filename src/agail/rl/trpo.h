@@ -31,7 +31,7 @@ struct TrpoReport {
 
 class Trpo {
  public:
-  Trpo(const PolicyNetwork<float>& network, ThreadPool& pool, const TrpoSettings& settings,
+  Trpo(const PolicyNetwork<float>& network, Team team, const TrpoSettings& settings,
        Index capacity);
 
   // One step of theta on a batch of n samples; see PolicyObjective::bind for shapes. `auxiliary`

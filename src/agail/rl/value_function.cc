@@ -7,10 +7,10 @@
 
 namespace agail {
 
-ValueFunction::ValueFunction(int observation_dim, const ValueSettings& settings, ThreadPool& pool,
+ValueFunction::ValueFunction(int observation_dim, const ValueSettings& settings, Team team,
                              Index capacity, std::uint64_t seed)
     : settings_(settings),
-      pool_(pool),
+      team_(team),
       seed_(seed),
       mlp_(layer_sizes(observation_dim, settings.hidden, 1), Activation::kTanh),
       theta_(Vector<float>::Zero(mlp_.parameters())),
@@ -22,18 +22,19 @@ ValueFunction::ValueFunction(int observation_dim, const ValueSettings& settings,
   RandomStream random(seed, Purpose::kInitialise, 1);
   mlp_.initialise(theta_.data(), random, 0.1);
   order_.reserve(static_cast<std::size_t>(capacity));
-  for (int i = 0; i < pool.threads(); ++i)
+  for (int i = 0; i < team.pool().threads(); ++i)
     workers_.push_back({mlp_.make_scratch(), Matrix<float>::Zero(1, kChunk)});
 }
 
 void ValueFunction::predict(const Matrix<float>& x, Index n, Vector<float>& values) {
-  for_each_chunk(pool_, n, [&](int, Index first, Index count) {
+  for_each_chunk(team_, n, [&](int, Index first, Index count) {
     mlp_.forward(theta_.data(), x.block(0, first, mlp_.inputs() + 1, count), tape_, first);
     values.segment(first, count) =
         (mlp_.output(tape_, first, count).row(0).array() * static_cast<float>(std_) +
          static_cast<float>(mean_))
             .transpose();
   });
+  gather_chunks(team_, n, values);
 }
 
 void ValueFunction::follow(const Vector<float>& targets, Index n) {
@@ -72,7 +73,7 @@ void ValueFunction::fit(const Matrix<float>& x, const Vector<float>& targets, In
             (targets[from] - static_cast<float>(mean_)) / static_cast<float>(std_);
       }
       const auto gradient =
-          sums_.sum(pool_, size, [&](Index, int w, Index first, Index count, float* out) {
+          sums_.sum(team_, size, [&](Index, int w, Index first, Index count, float* out) {
             Worker& worker = workers_[static_cast<std::size_t>(w)];
             const auto columns = minibatch_x_.block(0, first, rows, count);
             mlp_.forward(theta_.data(), columns, tape_, first);

@@ -13,8 +13,8 @@ namespace agail {
 // "Pop-Art", 2016).
 class ValueFunction {
  public:
-  ValueFunction(int observation_dim, const ValueSettings& settings, ThreadPool& pool,
-                Index capacity, std::uint64_t seed);
+  ValueFunction(int observation_dim, const ValueSettings& settings, Team team, Index capacity,
+                std::uint64_t seed);
 
   // values[j] = V(x_j), j < n. x: (observations + 1) x >= n, last row ones.
   void predict(const Matrix<float>& x, Index n, Vector<float>& values);
@@ -29,7 +29,7 @@ class ValueFunction {
   void follow(const Vector<float>& targets, Index n);
 
   ValueSettings settings_;
-  ThreadPool& pool_;
+  Team team_;
   std::uint64_t seed_;
   Mlp<float> mlp_;
   Vector<float> theta_;

@@ -1,7 +1,12 @@
 #include "agail/train/checkpoint.h"
 
+#include <algorithm>
+
 #include "agail/base/atomic_file.h"
+#include "agail/base/build_info.h"
 #include "agail/base/crc32c.h"
+#include "agail/comm/collectives.h"
+#include "agail/comm/together.h"
 #include "agail/config/resolve.h"
 #include "agail/demos/minari_writer.h"
 #include "agail/train/safetensors.h"
@@ -40,17 +45,51 @@ void walk(Archive& archive, Trainer& trainer, double& best_return) {
 CheckpointFile::CheckpointFile(const std::filesystem::path& folder, const TrainingTask& task)
     : file_(folder / "checkpoints" / "latest.safetensors"), identity_(identity(task)) {}
 
+std::uint32_t CheckpointFile::fingerprint() const {
+  std::string text = std::string(kVersion) + " " + cpu_features();
+  for (const auto& [key, value] : identity_) text += "\n" + key + " " + value;
+  return crc32c(std::vector<std::uint8_t>(text.begin(), text.end()));
+}
+
 void CheckpointFile::save(Trainer& trainer, double& best_return) const {
   TensorStore store;
   store.metadata = identity_;
   Archive archive(store, Archive::Mode::kSave);
   walk(archive, trainer, best_return);
-  write_file_atomically(file_, to_safetensors(store));
+  Communicator& communicator = trainer.team().communicator();
+  const std::vector<std::uint8_t> bytes = to_safetensors(store);
+  // The safety net of a state that is held by all: a machine that computes otherwise ends the job
+  // before its result is written.
+  if (const int other = first_that_differs(communicator, crc32c(bytes)); other >= 0)
+    throw SystemError("the state of " + communicator.name(other) +
+                      " is no longer that of rank 0; its machine or build computes differently");
+  if (communicator.rank() == 0) write_file_atomically(file_, bytes);
 }
 
 bool CheckpointFile::load(Trainer& trainer, double& best_return) const {
-  if (!std::filesystem::exists(file_)) return false;
-  TensorStore store = from_safetensors(read_file(file_), file_.string(), Checksum::kRequired);
+  Communicator& communicator = trainer.team().communicator();
+  std::vector<std::uint8_t> bytes;  // none: no checkpoint
+  together(communicator, [&] {
+    if (communicator.rank() != 0 || !std::filesystem::exists(file_)) return;
+    bytes = read_file(file_);
+    if (bytes.empty())
+      throw InputError(file_.string() + ": the checkpoint is empty; start a new run");
+  });
+  if (communicator.ranks() > 1) {
+    const auto view = std::as_bytes(std::span(bytes));
+    Bytes message(view.begin(), view.end());
+    broadcast(communicator, message);
+    bytes.resize(message.size());
+    std::ranges::copy(message, std::as_writable_bytes(std::span(bytes)).begin());
+  }
+  if (bytes.empty()) return false;
+  together(communicator, [&] { restore(bytes, trainer, best_return); });
+  return true;
+}
+
+void CheckpointFile::restore(const std::vector<std::uint8_t>& bytes, Trainer& trainer,
+                             double& best_return) const {
+  TensorStore store = from_safetensors(bytes, file_.string(), Checksum::kRequired);
   for (const auto& [key, value] : identity_) {
     const auto found = store.metadata.find(key);
     if (found == store.metadata.end() || found->second != value)
@@ -60,7 +99,6 @@ bool CheckpointFile::load(Trainer& trainer, double& best_return) const {
   }
   Archive archive(store, Archive::Mode::kLoad);
   walk(archive, trainer, best_return);
-  return true;
 }
 
 }  // namespace agail

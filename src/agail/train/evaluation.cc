@@ -4,6 +4,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "agail/comm/collectives.h"
+#include "agail/comm/pack.h"
+
 namespace agail {
 
 namespace {
@@ -54,6 +57,30 @@ std::vector<Actor> make_actors(const SavedPolicy& policy, const ThreadPool& pool
   return actors;
 }
 
+// Completes what every rank knows of its share of the episodes.
+void gather_episodes(Team team, std::vector<double>& returns, std::vector<double>& lengths,
+                     std::vector<std::uint8_t>& diverged) {
+  const auto share = [&](int rank) {
+    return share_of(static_cast<std::ptrdiff_t>(returns.size()), team.ranks(), rank);
+  };
+  const auto for_each_array = [&](const Share& s, auto&& visit) {
+    const auto count = static_cast<std::size_t>(s.size());
+    visit(returns.data() + s.begin, count);
+    visit(lengths.data() + s.begin, count);
+    visit(diverged.data() + s.begin, count);
+  };
+  Bytes message;
+  Packer pack(message);
+  for_each_array(share(team.rank()),
+                 [&](auto* values, std::size_t count) { pack.array(values, count); });
+  Blocks all;
+  allgather(team.communicator(), message, all);
+  for (int r = 0; r < team.ranks(); ++r) {
+    Unpacker unpack(all[r]);
+    for_each_array(share(r), [&](auto* values, std::size_t count) { unpack.array(values, count); });
+  }
+}
+
 }  // namespace
 
 double Evaluation::mean_return() const { return mean(returns); }
@@ -83,23 +110,25 @@ std::pair<double, double> bootstrap_interval(const std::vector<double>& values,
 }
 
 Evaluation evaluate(const SavedPolicy& policy, Index episodes, std::uint64_t seed, bool stochastic,
-                    ThreadPool& pool) {
-  std::vector<Actor> actors = make_actors(policy, pool);
+                    Team team) {
+  std::vector<Actor> actors = make_actors(policy, team.pool());
   const auto n = static_cast<std::size_t>(episodes);
   std::vector<double> returns(n), lengths(n);
   std::vector<std::uint8_t> diverged(n);
-  pool.run(static_cast<int>(episodes), [&](int episode, int worker) {
+  const Share own = share_of(episodes, team.ranks(), team.rank());
+  team.pool().run(static_cast<int>(own.size()), [&](int task, int worker) {
     Actor& actor = actors[static_cast<std::size_t>(worker)];
-    const auto e = static_cast<std::size_t>(episode);
+    const auto e = static_cast<std::size_t>(own.begin + task);
     run_episode(
         policy, *actor.environment, actor.workspace, seed, Purpose::kEvaluate,
-        static_cast<std::uint32_t>(episode), stochastic, [] {},
+        static_cast<std::uint32_t>(e), stochastic, [] {},
         [&](const std::vector<float>&, const StepResult& result) {
           returns[e] += result.reward;
           lengths[e] += 1;
           if (result.diverged) diverged[e] = 1;
         });
   });
+  if (team.ranks() > 1) gather_episodes(team, returns, lengths, diverged);
   Evaluation evaluation{std::move(returns), std::move(lengths), 0};
   for (const std::uint8_t d : diverged) evaluation.diverged += d;
   return evaluation;

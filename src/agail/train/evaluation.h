@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "agail/base/thread_pool.h"
+#include "agail/comm/team.h"
 #include "agail/demos/demonstrations.h"
 #include "agail/train/saved_policy.h"
 
@@ -23,11 +23,12 @@ struct Evaluation {
 // 95 % percentile bootstrap interval of the mean (Efron), from 10,000 resamples.
 std::pair<double, double> bootstrap_interval(const std::vector<double>& values, std::uint64_t seed);
 
-// Episode e is the same for any number of threads: reset and actions have streams of their own.
+// Episode e is the same for any number of threads and ranks (which share the episodes): reset and
+// actions have streams of their own.
 // Takes the mode of the policy unless `stochastic`. Stops early, with the episodes that are whole,
 // when interrupted() becomes true.
 Evaluation evaluate(const SavedPolicy& policy, Index episodes, std::uint64_t seed, bool stochastic,
-                    ThreadPool& pool);
+                    Team team);
 
 // The same episodes (under streams of their own) as complete demonstrations.
 Demonstrations record(const SavedPolicy& policy, Index episodes, std::uint64_t seed,

@@ -3,11 +3,14 @@
 #include <chrono>
 #include <cstdio>
 #include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "agail/base/atomic_file.h"
 #include "agail/base/build_info.h"
 #include "agail/base/interrupt.h"
+#include "agail/comm/collectives.h"
+#include "agail/comm/together.h"
 #include "agail/train/checkpoint.h"
 #include "agail/train/run_log.h"
 
@@ -52,7 +55,7 @@ void check_folder(const fs::path& folder, bool resume) {
 }
 
 void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutcome& outcome,
-                   double wall_seconds) {
+                   const Traffic& traffic, double wall_seconds) {
   const TrainingTask& task = trainer.task();
   nlohmann::ordered_json summary = {{"environment", task.environment},
                                     {"method", task.method},
@@ -89,7 +92,11 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
   summary["mujoco"] = physics_version();
   summary["cpu"] = cpu_features();
   summary["threads"] = task.threads;
-  summary["ranks"] = 1;
+  summary["ranks"] = trainer.team().ranks();
+  if (trainer.team().ranks() > 1)
+    summary["traffic"] = {{"messages", traffic.messages},
+                          {"bytes", traffic.bytes},
+                          {"seconds_of_all_ranks", traffic.seconds}};
   summary["wall_seconds"] = wall_seconds;
   write_file_atomically(folder / "summary.json", summary.dump(2) + "\n");
 }
@@ -105,72 +112,135 @@ void tell_start(const Trainer& trainer) {
     std::fprintf(stderr, "policy cloned (held-out %s %.3f)\n", measure, trainer.cloning()->quality);
 }
 
-}  // namespace
+// Prepares, then trains. What only rank 0 does (files, the log) does not change the state.
+class Run {
+ public:
+  Run(TrainingTask task, fs::path folder, bool resume, Communicator& communicator)
+      : settings_(task.settings.run),
+        folder_(std::move(folder)),
+        resume_(resume),
+        communicator_(communicator),
+        first_(communicator.rank() == 0) {
+    together(communicator_, [&] {
+      if (first_) check_folder(folder_, resume_);
+      // A task that makes no sense ends here, and leaves nothing behind.
+      trainer_ = std::make_unique<Trainer>(std::move(task), communicator_);
+    });
+  }
 
-RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume) {
-  const Clock::time_point begin = Clock::now();
-  const RunSettings run = task.settings.run;
-  check_folder(folder, resume);
-  InterruptGuard guard;
-  Trainer trainer(
-      std::move(task));  // a task that makes no sense ends here, and leaves nothing behind
-  RunOutcome outcome;
-  outcome.signal = interrupted();
-  if (outcome.signal != 0) return outcome;
-  create_output_folder(folder);
-  create_output_folder(folder / "checkpoints");
-  remove_unfinished_files(folder);
-  remove_unfinished_files(folder / "checkpoints");
-  const bool selects_best =
-      trainer.task().method == "trpo";  // an imitator has no true reward to select by
+  // Everything before the first update; false if a signal came.
+  bool prepare();
+  void train();
+  const RunOutcome& outcome() const { return outcome_; }
 
-  double best_return = -std::numeric_limits<double>::max();
-  const CheckpointFile checkpoint(folder, trainer.task());
-  const bool resumed = resume && checkpoint.load(trainer, best_return);
-  tell_start(trainer);
-  write_file_atomically(folder / "config.toml", trainer.task().settings_toml);
-  RunLog log(folder, run.timesteps, resumed ? std::optional(trainer.timesteps()) : std::nullopt);
+ private:
+  // The first signal that any rank noted, known to all: they must stop after the same update.
+  bool interrupted_anywhere() {
+    if (outcome_.signal == 0) outcome_.signal = largest(communicator_, interrupted());
+    return outcome_.signal != 0;
+  }
+  std::optional<Evaluation> evaluate_now();
+  void save();
 
-  const auto evaluate_now = [&] {
-    const SavedPolicy policy = trainer.policy();
-    outcome.last =
-        evaluate(policy, run.evaluation_episodes, trainer.task().seed, false, trainer.pool());
-    if (selects_best && outcome.last->mean_return() > best_return) {
-      best_return = outcome.last->mean_return();
-      outcome.best = outcome.last;
-      policy.save(folder / "policy_best.safetensors");
-    }
-    return outcome.last;
-  };
+  const Clock::time_point begin_ = Clock::now();
+  InterruptGuard guard_;
+  RunSettings settings_;
+  fs::path folder_;
+  bool resume_;
+  Communicator& communicator_;
+  bool first_;  // the rank that writes
+  std::unique_ptr<Trainer> trainer_;
+  std::optional<CheckpointFile> checkpoint_;
+  std::optional<RunLog> log_;  // of the first rank
+  RunOutcome outcome_;
+  double best_return_ = -std::numeric_limits<double>::max();
+  bool resumed_ = false;
+  std::int64_t saved_timesteps_ = -1;
+};
 
-  if (trainer.cloning() && trainer.learns_by_interaction() && !resumed && run.evaluate_every > 0)
-    outcome.cloned = evaluate_now();
+bool Run::prepare() {
+  if (interrupted_anywhere()) return false;
+  checkpoint_.emplace(folder_, trainer_->task());
+  const int other = first_that_differs(communicator_, checkpoint_->fingerprint());
+  together(communicator_, [&] {
+    if (other >= 0)
+      throw InputError(communicator_.name(other) +
+                       " has other arguments, demonstrations, version " + "or CPU features than " +
+                       communicator_.name(0) +
+                       "; give all ranks the same program and files on machines of one kind");
+    if (!first_) return;
+    create_output_folder(folder_);
+    create_output_folder(folder_ / "checkpoints");
+    remove_unfinished_files(folder_);
+    remove_unfinished_files(folder_ / "checkpoints");
+  });
+  resumed_ = resume_ && checkpoint_->load(*trainer_, best_return_);
+  together(communicator_, [&] {
+    if (!first_) return;
+    tell_start(*trainer_);
+    write_file_atomically(folder_ / "config.toml", trainer_->task().settings_toml);
+    log_.emplace(folder_, settings_.timesteps,
+                 resumed_ ? std::optional(trainer_->timesteps()) : std::nullopt);
+  });
+  return true;
+}
 
-  std::int64_t saved_timesteps = -1;
-  const auto save = [&] {
-    log.flush();  // what the checkpoint has seen is in the log
-    checkpoint.save(trainer, best_return);
-    saved_timesteps = trainer.timesteps();
-  };
+std::optional<Evaluation> Run::evaluate_now() {
+  const SavedPolicy policy = trainer_->policy();
+  outcome_.last = evaluate(policy, settings_.evaluation_episodes, trainer_->task().seed, false,
+                           trainer_->team());
+  // An imitator has no true reward to select by.
+  if (trainer_->task().method == "trpo" && outcome_.last->mean_return() > best_return_) {
+    best_return_ = outcome_.last->mean_return();
+    outcome_.best = outcome_.last;
+    if (first_) policy.save(folder_ / "policy_best.safetensors");
+  }
+  return outcome_.last;
+}
+
+void Run::save() {
+  if (first_) log_->flush();  // what the checkpoint has seen is in the log
+  checkpoint_->save(*trainer_, best_return_);
+  saved_timesteps_ = trainer_->timesteps();
+}
+
+void Run::train() {
+  Trainer& trainer = *trainer_;
+  if (trainer.cloning() && trainer.learns_by_interaction() && !resumed_ &&
+      settings_.evaluate_every > 0)
+    outcome_.cloned = evaluate_now();
+
   // An interrupt waits for the update and its evaluation: a second or so.
-  while (!trainer.finished() && interrupted() == 0) {
+  while (!trainer.finished() && !interrupted_anywhere()) {
     const UpdateReport report = trainer.update();
     std::optional<Evaluation> evaluation;
-    if (run.evaluate_every > 0 && (report.update % run.evaluate_every == 0 || trainer.finished()))
+    if (settings_.evaluate_every > 0 &&
+        (report.update % settings_.evaluate_every == 0 || trainer.finished()))
       evaluation = evaluate_now();
-    log.update(report, trainer.stopwatch(), evaluation);
-    if (report.update % run.checkpoint_every == 0 || trainer.finished()) save();
+    if (first_) log_->update(report, trainer.stopwatch(), evaluation);
+    if (report.update % settings_.checkpoint_every == 0 || trainer.finished()) save();
   }
-  if (trainer.learns_by_interaction() && saved_timesteps != trainer.timesteps()) save();
-  if (!trainer.learns_by_interaction() && interrupted() == 0) evaluate_now();
-  log.finish();
+  if (trainer.learns_by_interaction() && saved_timesteps_ != trainer.timesteps()) save();
+  if (!trainer.learns_by_interaction() && !interrupted_anywhere()) evaluate_now();
 
-  outcome.signal = interrupted();
-  outcome.timesteps = trainer.timesteps();
-  trainer.policy().save(folder / "policy.safetensors");
-  write_summary(folder, trainer, outcome,
-                std::chrono::duration<double>(Clock::now() - begin).count());
-  return outcome;
+  interrupted_anywhere();
+  outcome_.timesteps = trainer.timesteps();
+  const Traffic traffic = total_of(communicator_, communicator_.traffic());
+  if (!first_) return;
+  log_->finish();
+  trainer.policy().save(folder_ / "policy.safetensors");
+  write_summary(folder_, trainer, outcome_, traffic,
+                std::chrono::duration<double>(Clock::now() - begin_).count());
+}
+
+}  // namespace
+
+RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume,
+                        Communicator& communicator) {
+  Run run(std::move(task), folder, resume, communicator);
+  if (!run.prepare()) return run.outcome();
+  or_abort(communicator, [&] { run.train(); });
+  return run.outcome();
 }
 
 }  // namespace agail

@@ -26,20 +26,21 @@ std::string dimensions(int observations, const ActionSpace& action) {
 
 }  // namespace
 
-Trainer::Trainer(TrainingTask task)
+Trainer::Trainer(TrainingTask task, Communicator& communicator)
     : task_(std::move(task)),
       spec_(environment_spec(task_.environment)),
       pool_(task_.threads),
+      team_(pool_, communicator),
       network_(spec_.observation_dim, task_.settings.policy.hidden, spec_.action),
       theta_(Vector<float>::Zero(network_.parameters())),
       normalizer_(spec_.observation_dim, task_.settings.policy.normalize_observations,
                   task_.settings.policy.observation_clip),
-      collector_(task_.environment, task_.settings.run.lanes, task_.seed, pool_),
+      collector_(task_.environment, task_.settings.run.lanes, task_.seed, team_),
       batch_(spec_.observation_dim, spec_.action.dim, task_.settings.run.lanes,
              steps_a_lane(task_.settings.run)),
-      value_(spec_.observation_dim, task_.settings.value, pool_, batch_.size(), task_.seed),
+      value_(spec_.observation_dim, task_.settings.value, team_, batch_.size(), task_.seed),
       advantage_(spec_.observation_dim, batch_.size()),
-      trpo_(network_, pool_, task_.settings.trpo, batch_.size()),
+      trpo_(network_, team_, task_.settings.trpo, batch_.size()),
       rewards_(Vector<float>::Zero(batch_.size())) {
   check();
   recent_returns_.reserve(kRecentEpisodes);
@@ -85,7 +86,7 @@ void Trainer::start() {
   const bool adversarial = task_.method != "bc";
   if (adversarial)
     reward_ = std::make_unique<AdversarialReward>(task_.method, *demos_, spec_.action, missing,
-                                                  settings, pool_, batch_.size(), task_.seed);
+                                                  settings, team_, batch_.size(), task_.seed);
 
   // state-gail is the method that never looks at an action.
   const bool has_actions = !demos_->some_action.empty() && task_.method != "state-gail";

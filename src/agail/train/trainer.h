@@ -45,8 +45,9 @@ struct UpdateReport {
 class Trainer {
  public:
   // Checks that task and demonstrations fit together (InputError) and builds everything; a cloned
-  // start is fitted here.
-  explicit Trainer(TrainingTask task);
+  // start is fitted here. Several ranks train one policy if each has a Trainer of the same task;
+  // building exchanges nothing.
+  explicit Trainer(TrainingTask task, Communicator& communicator = no_other_ranks());
 
   // Collects a batch and learns from it. Not for bc, which is done once constructed.
   UpdateReport update();
@@ -58,13 +59,14 @@ class Trainer {
   bool learns_by_interaction() const { return task_.method != "bc"; }
   const TrainingTask& task() const { return task_; }
   ThreadPool& pool() { return pool_; }
+  Team team() const { return team_; }
   SavedPolicy policy() const;
 
   // How the policy was cloned, and how missing actions were inferred before that.
   const std::optional<RegressionReport>& cloning() const { return cloning_; }
   const std::optional<RegressionReport>& inverse_dynamics() const { return inverse_dynamics_; }
 
-  // Everything that the next update depends on.
+  // Everything that the next update depends on. Saving is for all ranks together.
   void archive(Archive& a);
 
   // For benchmarks: the collector before an update, and what the update collected and cost.
@@ -79,6 +81,7 @@ class Trainer {
   TrainingTask task_;
   EnvironmentSpec spec_;
   ThreadPool pool_;
+  Team team_;
   std::unique_ptr<DemoData> demos_;
   PolicyNetwork<float> network_;
   Vector<float> theta_;
