@@ -14,6 +14,7 @@
 #include "agail/train/evaluation.h"
 #include "agail/train/trainer.h"
 #include "commands.h"
+#include "peak.h"
 
 namespace agail {
 namespace {
@@ -67,12 +68,15 @@ ordered_json measure(const Options& options, Trainer& trainer) {
   constexpr int kWarmUp = 3;
   double training = 0, stepping = 0;
   std::array<double, static_cast<std::size_t>(Phase::kCount)> before{};
+  std::array<std::int64_t, static_cast<std::size_t>(Phase::kCount)> flops_before{};
   for (int i = 0; i < kWarmUp + options.updates; ++i) {
     if (i == kWarmUp) {
       traffic = {};
       training = stepping = 0;
-      for (std::size_t p = 0; p < before.size(); ++p)
+      for (std::size_t p = 0; p < before.size(); ++p) {
         before[p] = trainer.stopwatch().seconds(static_cast<Phase>(p));
+        flops_before[p] = trainer.stopwatch().flops(static_cast<Phase>(p));
+      }
     }
     TensorStore state;
     Archive saving(state, Archive::Mode::kSave);
@@ -95,7 +99,7 @@ ordered_json measure(const Options& options, Trainer& trainer) {
   const double samples =
       static_cast<double>(options.updates) * static_cast<double>(trainer.batch().size());
   const auto microseconds = [&](double seconds) { return 1e6 * seconds / samples; };
-  ordered_json split;
+  ordered_json split, gflops;
   // Time between updates (copying the state) is no part of training: the rest is what the phases
   // leave of it.
   double named = 0;
@@ -103,6 +107,8 @@ ordered_json measure(const Options& options, Trainer& trainer) {
     const double spent = trainer.stopwatch().seconds(static_cast<Phase>(p)) - before[p];
     named += spent;
     split[kPhaseNames[p]] = microseconds(spent);
+    const std::int64_t flops = trainer.stopwatch().flops(static_cast<Phase>(p)) - flops_before[p];
+    if (flops > 0 && spent > 0) gflops[kPhaseNames[p]] = 1e-9 * static_cast<double>(flops) / spent;
   }
   split["rest"] = microseconds(training - named);
   const SavedPolicy policy = trainer.policy();
@@ -119,6 +125,8 @@ ordered_json measure(const Options& options, Trainer& trainer) {
                          {"training_us", microseconds(training)},
                          {"ratio", training / stepping},
                          {"split_us", split},
+                         {"gflops", gflops},
+                         {"peak_gflops", 1e-9 * peak_flops_per_second()},
                          {"signature", signature}};
   if (communicator.ranks() == 1) return result;
   const Traffic total = total_of(communicator, traffic);
@@ -149,8 +157,16 @@ void run(Options options, Communicator& communicator) {
         environment.c_str(), options.method.c_str(), options.preset.c_str(),
         result["stepping_us"].get<double>(), result["training_us"].get<double>(),
         result["ratio"].get<double>(), result["signature"].get<std::string>().c_str());
-    for (const auto& [name, value] : result["split_us"].items())
-      std::printf("  %-20s %8.3f us\n", name.c_str(), value.get<double>());
+    const auto peak = result["peak_gflops"].get<double>();
+    for (const auto& [name, value] : result["split_us"].items()) {
+      std::printf("  %-20s %8.3f us", name.c_str(), value.get<double>());
+      if (result["gflops"].contains(name)) {
+        const auto rate = result["gflops"][name].get<double>();
+        std::printf("  %6.1f GFLOP/s in products, %2.0f %% of a core's peak", rate,
+                    100 * rate / peak);
+      }
+      std::printf("\n");
+    }
     if (result.contains("traffic_an_update"))
       std::printf("  %d ranks sent %.0f messages, %.0f bytes an update\n", communicator.ranks(),
                   result["traffic_an_update"]["messages"].get<double>(),

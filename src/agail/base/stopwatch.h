@@ -1,9 +1,12 @@
-// Where a training run spends its time: one phase at a time, switched by the code that starts it.
+// Where a training run spends its time and does its arithmetic: one phase at a time, switched by
+// the code that starts it.
 #pragma once
 
 #include <array>
 #include <chrono>
 #include <cstddef>
+
+#include "agail/base/flops.h"
 
 namespace agail {
 
@@ -32,6 +35,9 @@ class Stopwatch {
     seconds_[static_cast<std::size_t>(phase_)] +=
         std::chrono::duration<double>(now - since_).count();
     since_ = now;
+    const std::int64_t flops = counted_flops().load(std::memory_order_relaxed);
+    flops_[static_cast<std::size_t>(phase_)] += flops - flops_before_;
+    flops_before_ = flops;
     phase_ = phase;
   }
   // Time measured elsewhere (by several threads, divided by their number) that the current phase
@@ -40,11 +46,20 @@ class Stopwatch {
     seconds_[static_cast<std::size_t>(phase)] += seconds;
     seconds_[static_cast<std::size_t>(phase_)] -= seconds;
   }
+  // Arithmetic of the current phase so far that is another's.
+  void move_flops_to(Phase phase) {
+    const std::int64_t flops = counted_flops().load(std::memory_order_relaxed);
+    flops_[static_cast<std::size_t>(phase)] += flops - flops_before_;
+    flops_before_ = flops;
+  }
+  std::int64_t flops(Phase phase) const { return flops_[static_cast<std::size_t>(phase)]; }
   double seconds(Phase phase) const { return seconds_[static_cast<std::size_t>(phase)]; }
 
  private:
   using Clock = std::chrono::steady_clock;
   std::array<double, static_cast<std::size_t>(Phase::kCount)> seconds_{};
+  std::array<std::int64_t, static_cast<std::size_t>(Phase::kCount)> flops_{};
+  std::int64_t flops_before_ = counted_flops().load(std::memory_order_relaxed);
   Clock::time_point since_ = Clock::now();
   Phase phase_ = Phase::kRest;
 };

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "agail/base/flops.h"
+
 // Eigen's packets are vector types; their alignment, which templates drop, is not relied on.
 #pragma GCC diagnostic ignored "-Wignored-attributes"
 
@@ -200,6 +202,7 @@ void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Inde
 template <class S>
 void multiply(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add) {
   eigen_assert(a.cols() == b.rows() && c.rows() == a.rows() && c.cols() == b.cols());
+  count_flops(2 * a.size() * c.cols());
   if (a.rows() >= kWidth<S> && a.cols() > 0)
     multiply_any<S, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
                                   {b.data(), 1, b.outerStride()}, b.cols(),
@@ -213,6 +216,7 @@ void multiply(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add)
 template <class S>
 void multiply_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S> c) {
   eigen_assert(a.rows() == b.rows() && c.rows() == a.cols() && c.cols() == b.cols());
+  count_flops(2 * a.size() * c.cols());
   if (a.cols() >= kWidth<S> && a.rows() > 0)
     multiply_any<S, Lies::kTransposed>(a.data(), a.outerStride(), a.cols(), a.rows(),
                                        {b.data(), 1, b.outerStride()}, b.cols(),
@@ -224,6 +228,7 @@ void multiply_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S> c
 template <class S>
 void multiply_by_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add) {
   eigen_assert(a.cols() == b.cols() && c.rows() == a.rows() && c.cols() == b.rows());
+  count_flops(2 * a.size() * c.cols());
   if (a.rows() >= kWidth<S> && a.cols() > 0)
     multiply_any<S, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
                                   {b.data(), b.outerStride(), 1}, b.rows(),

@@ -125,6 +125,7 @@ void Collector::collect(const PolicyNetwork<float>& network, const Vector<float>
   const auto threads = static_cast<double>(std::min<Index>(own_.size(), team_.pool().threads()));
   stopwatch.move_to(Phase::kPhysics, physics / threads);
   stopwatch.move_to(Phase::kInference, inference / threads);
+  stopwatch.move_flops_to(Phase::kInference);
 }
 
 void Collector::replay(const Batch& batch) {
