@@ -95,7 +95,7 @@ TEST_F(Csv, ChecksTheKnownActionSpace) {
 }
 
 void put(std::string& out, std::uint64_t value, int width) {
-  for (int i = 0; i < width; ++i) out += static_cast<char>(value >> (8 * i) & 0xff);
+  for (int i = 0; i < width; ++i) out += i < 8 ? static_cast<char>(value >> (8 * i) & 0xff) : '\0';
 }
 
 std::string npy(const std::string& type, const std::string& shape, const std::string& data) {
