@@ -35,15 +35,16 @@ class Agail:
 
     def run(self, *arguments, **options):
         command = [self.program, *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=300, **options)
+        options.setdefault("timeout", 300)
+        return subprocess.run(command, capture_output=True, text=True, **options)
 
     def start(self, *arguments):
         command = [self.program, *map(str, arguments)]
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
 
-    def __call__(self, *arguments):
+    def __call__(self, *arguments, **options):
         """Its standard output; it must succeed."""
-        done = self.run(*arguments)
+        done = self.run(*arguments, **options)
         assert done.returncode == 0, done.stderr
         return done.stdout
 

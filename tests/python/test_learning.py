@@ -9,7 +9,8 @@ DATA = Path(__file__).resolve().parents[2] / "data"
 
 def train_and_evaluate(agail, tmp_path: Path, environment: str, method: str, *options) -> dict:
     run = tmp_path / f"{environment}-{method}-{len(list(tmp_path.iterdir()))}"
-    agail("train", environment, "--method", method, "--threads", 1, "--out", run, *options)
+    command = ["train", environment, "--method", method, "--threads", 1, "--out", run, *options]
+    agail(*command, timeout=3600)  # a million steps of Humanoid
     return agail.json("eval", run, "--episodes", 50)
 
 
