@@ -107,18 +107,17 @@ template <class S, int P, int N>
 
 template <class S, int P>
 void panel_of_packets(Left<S> a, Right<S> b, Index depth, Index columns, Result<S> c, Rows rows) {
-  const auto advance = [&](Index n) {
-    b.data += n * b.column;
-    c.data += n * c.column;
-    columns -= n;
-  };
+  Index j = 0;
+  const auto right = [&] { return Right<S>{b.data + j * b.column, b.step, b.column}; };
+  const auto result = [&] { return Result<S>{c.data + j * c.column, c.column, c.add}; };
   if constexpr (P <= kPackets) {
     constexpr int kColumns = columns_for(P);
-    for (; columns >= kColumns; advance(kColumns)) tile<S, P, kColumns>(a, b, depth, c, rows);
-    for (; columns >= 4; advance(4)) tile<S, P, 4>(a, b, depth, c, rows);
-    for (; columns >= 2; advance(2)) tile<S, P, 2>(a, b, depth, c, rows);
+    for (; j + kColumns <= columns; j += kColumns)
+      tile<S, P, kColumns>(a, right(), depth, result(), rows);
+    for (; j + 4 <= columns; j += 4) tile<S, P, 4>(a, right(), depth, result(), rows);
+    for (; j + 2 <= columns; j += 2) tile<S, P, 2>(a, right(), depth, result(), rows);
   }
-  for (; columns >= 1; advance(1)) tile<S, P, 1>(a, b, depth, c, rows);
+  for (; j < columns; ++j) tile<S, P, 1>(a, right(), depth, result(), rows);
 }
 
 template <class S>
