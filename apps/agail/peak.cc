@@ -25,8 +25,7 @@ double peak_flops_per_second() {
     for (Packet& s : sum) s = f;
     const Clock::time_point start = Clock::now();
     for (int i = 0; i < kSteps; ++i) {
-      _Pragma("GCC unroll 12") for (int k = 0; k < kSums; ++k) sum[k] =
-          Eigen::internal::pmadd(sum[k], f, f);
+      for (Packet& s : sum) s = Eigen::internal::pmadd(s, f, f);
     }
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
     for (const Packet& s : sum) sink = sink + Eigen::internal::pfirst(s);

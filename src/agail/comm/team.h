@@ -39,7 +39,9 @@ class Team {
 
   // Whether chunks are spread over the ranks: two a rank take longer than their sum's way. The bits
   // do not depend on it.
-  bool spreads(std::ptrdiff_t chunks) const { return ranks() > 1 && chunks >= 2 * ranks(); }
+  bool spreads(std::ptrdiff_t chunks) const {
+    return ranks() > 1 && chunks >= std::ptrdiff_t{2} * ranks();
+  }
   Share share(std::ptrdiff_t chunks) const {
     return spreads(chunks) ? share_of_chunks(chunks, ranks(), rank()) : Share{0, chunks};
   }
