@@ -75,7 +75,10 @@ class LocalRanks {
 
   explicit LocalRanks(int ranks)
       : ranks_(ranks), queues_(static_cast<std::size_t>(ranks) * static_cast<std::size_t>(ranks)) {}
-  Queue& queue(int from, int to) { return queues_[static_cast<std::size_t>(from * ranks_ + to)]; }
+  Queue& queue(int from, int to) {
+    return queues_[static_cast<std::size_t>(from) * static_cast<std::size_t>(ranks_) +
+                   static_cast<std::size_t>(to)];
+  }
 
   int ranks_;
   std::vector<Queue> queues_;
