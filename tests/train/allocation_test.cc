@@ -24,6 +24,7 @@ std::atomic<long> allocations{0};
 
 #if AGAIL_COUNTS_ALLOCATIONS
 // In front of glibc's, which operator new, Eigen and all libraries then call.
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-inconsistent-declaration-parameter-name)
 extern "C" {
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
@@ -56,6 +57,7 @@ int posix_memalign(void** memory, std::size_t alignment, std::size_t size) {
   return *memory == nullptr ? ENOMEM : 0;
 }
 }
+// NOLINTEND(bugprone-reserved-identifier,readability-inconsistent-declaration-parameter-name)
 #endif
 
 namespace agail {
