@@ -120,26 +120,14 @@ void panel_of_packets(Left<S> a, Right<S> b, Index depth, Index columns, Result<
   for (; j < columns; ++j) tile<S, P, 1>(a, right(), depth, result(), rows);
 }
 
-template <class S>
-void panel(int packets, Left<S> a, Right<S> b, Index depth, Index columns, Result<S> c, Rows rows) {
-  switch (packets) {
-    case 1:
-      return panel_of_packets<S, 1>(a, b, depth, columns, c, rows);
-    case 2:
-      return panel_of_packets<S, 2>(a, b, depth, columns, c, rows);
-    case 3:
-      return panel_of_packets<S, 3>(a, b, depth, columns, c, rows);
-    case 4:
-      return panel_of_packets<S, 4>(a, b, depth, columns, c, rows);
-    case 5:
-      return panel_of_packets<S, 5>(a, b, depth, columns, c, rows);
-    case 6:
-      return panel_of_packets<S, 6>(a, b, depth, columns, c, rows);
-    case 7:
-      return panel_of_packets<S, 7>(a, b, depth, columns, c, rows);
-    default:
-      return panel_of_packets<S, 8>(a, b, depth, columns, c, rows);
-  }
+// The panel with as many packets, found among those known at compile time.
+template <class S, int P = kPacketsAlone>
+void panel(Index packets, Left<S> a, Right<S> b, Index depth, Index columns, Result<S> c,
+           Rows rows) {
+  if (packets == P)
+    panel_of_packets<S, P>(a, b, depth, columns, c, rows);
+  else if constexpr (P > 1)
+    panel<S, P - 1>(packets, a, b, depth, columns, c, rows);
 }
 
 // to[i + p * step] = from[p + i * column] for i < rows, zero for the other i < step.
@@ -187,8 +175,7 @@ void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Inde
         left = {packed, packets * kW};
         pack_transposed(a + p + first * a_column, a_column, count, depth, packed, left.step);
       }
-      panel<S>(static_cast<int>(packets), left, right, depth, n,
-               {c.data + first, c.column, c.add || p > 0}, rows);
+      panel<S>(packets, left, right, depth, n, {c.data + first, c.column, c.add || p > 0}, rows);
       done = first + count;
     }
   }
