@@ -98,7 +98,7 @@ TEST_P(GuideNetworkTest, FirstLayerStaysSeparated) {
     last = network_.loss(pool, sums, scratch, theta_, x_, targets_, available_, kSamples, tape,
                          gradient);
     if (step == 0) first = last;
-    adam.descend(theta_, gradient, 1e-2);
+    adam.descend(pool, theta_, gradient, 1e-2);
   }
   EXPECT_LT(last, first);
   // [s; a] -> units of s, units of a: zero where s meets the units of a, and the other way round.

@@ -16,9 +16,10 @@ TEST(Adam, EqualsThePlainAlgorithm) {
   Vector<double> theta = reference::normal_vector(n, 2), expected = theta;
   std::vector<double> m(n, 0), v(n, 0);
   Adam<double> adam(n);
+  ThreadPool pool(2);
   for (int t = 1; t <= 50; ++t) {
     const double rate = 0.01 / t;
-    adam.descend(theta, theta - target, rate);
+    adam.descend(pool, theta, theta - target, rate);
     for (Index i = 0; i < n; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const double g = expected[i] - target[i];
@@ -35,14 +36,15 @@ TEST(Adam, ContinuesFromAnArchive) {
   const Vector<float> start = reference::normal_vector(40, 1).cast<float>();
   const Vector<float> gradient = reference::normal_vector(40, 2).cast<float>();
   Adam<float> whole(40), half(40), rest(40);
+  ThreadPool pool(1);
   Vector<float> a = start, b = start;
-  for (int i = 0; i < 6; ++i) whole.descend(a, gradient * static_cast<float>(i), 1e-2);
-  for (int i = 0; i < 3; ++i) half.descend(b, gradient * static_cast<float>(i), 1e-2);
+  for (int i = 0; i < 6; ++i) whole.descend(pool, a, gradient * static_cast<float>(i), 1e-2);
+  for (int i = 0; i < 3; ++i) half.descend(pool, b, gradient * static_cast<float>(i), 1e-2);
   TensorStore store;
   Archive save(store, Archive::Mode::kSave), load(store, Archive::Mode::kLoad);
   half.archive(save);
   rest.archive(load);
-  for (int i = 3; i < 6; ++i) rest.descend(b, gradient * static_cast<float>(i), 1e-2);
+  for (int i = 3; i < 6; ++i) rest.descend(pool, b, gradient * static_cast<float>(i), 1e-2);
   EXPECT_TRUE(reference::same_bits(a, b));
 }
 

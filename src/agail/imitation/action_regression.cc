@@ -144,7 +144,7 @@ RegressionReport fit_actions(const PolicyNetwork<float>& network, Vector<float>&
       const Index count = std::min<Index>(settings.minibatch, training_size - start);
       loss += minibatches.loss(theta, x, actions, available, training.data() + start, count) *
               static_cast<double>(count) / static_cast<double>(training_size);
-      adam.descend(theta.head(network.mlp.parameters()), minibatches.gradient(), rate);
+      adam.descend(pool, theta.head(network.mlp.parameters()), minibatches.gradient(), rate);
     }
     report.epochs = epoch;
     if (held > 0) {

@@ -186,7 +186,7 @@ DiscriminatorReport Discriminator::learn(const Samples& policy, const Samples& d
       }
     }
     const DiscriminatorReport one = loss_.gradient(theta_, minibatch_, between_, gradient_);
-    adam_.descend(theta_, gradient_, settings_.learning_rate);
+    adam_.descend(team_.pool(), theta_, gradient_, settings_.learning_rate);
     report.loss += share * one.loss;
     report.policy_accuracy += share * one.policy_accuracy;
     report.demo_accuracy += share * one.demo_accuracy;

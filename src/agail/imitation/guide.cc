@@ -180,7 +180,7 @@ GuideReport Guide::learn(const PolicyView& policy, Index minibatches, std::uint3
     }
     const double loss = network_.loss(team_.pool(), sums_, scratch_, theta_, x_, targets_,
                                       available_, minibatch_, tape_, gradient_);
-    adam_.descend(theta_, gradient_, settings_.learning_rate);
+    adam_.descend(team_.pool(), theta_, gradient_, settings_.learning_rate);
     auto log_std = theta_.tail(network_.distribution.log_stds());
     log_std = log_std.cwiseMax(kLogStdFloor);
     report.loss += loss / static_cast<double>(minibatches);

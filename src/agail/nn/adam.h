@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "agail/base/archive.h"
+#include "agail/base/thread_pool.h"
 #include "agail/nn/matrix.h"
 
 namespace agail {
@@ -16,8 +17,8 @@ class Adam {
       : first_(Vector<S>::Zero(parameters)), second_(Vector<S>::Zero(parameters)) {}
 
   // theta -= learning rate * m^ / (sqrt(v^) + epsilon)
-  void descend(Eigen::Ref<Vector<S>> theta, const Eigen::Ref<const Vector<S>>& gradient,
-               double learning_rate) {
+  void descend(ThreadPool& pool, Eigen::Ref<Vector<S>> theta,
+               const Eigen::Ref<const Vector<S>>& gradient, double learning_rate) {
     ++step_;
     const double correction1 = 1 - std::pow(kBeta1, static_cast<double>(step_));
     const double correction2 = std::sqrt(1 - std::pow(kBeta2, static_cast<double>(step_)));
@@ -26,7 +27,9 @@ class Adam {
     constexpr auto b1 = static_cast<S>(kBeta1);
     constexpr auto b2 = static_cast<S>(kBeta2);
     constexpr Index kBlock = 1024;  // one pass over memory
-    for (Index i = 0; i < theta.size(); i += kBlock) {
+    const Index blocks = (theta.size() + kBlock - 1) / kBlock;
+    pool.run(static_cast<int>(blocks), [&](int block, int) {
+      const Index i = block * kBlock;
       const Index n = std::min(kBlock, theta.size() - i);
       auto m = first_.segment(i, n).array();
       auto v = second_.segment(i, n).array();
@@ -34,7 +37,7 @@ class Adam {
       m = b1 * m + (S(1) - b1) * g;
       v = b2 * v + (S(1) - b2) * g.square();
       theta.segment(i, n).array() -= rate * m / (v.sqrt() + epsilon);
-    }
+    });
   }
 
   void archive(Archive& a) requires std::same_as<S, float> {

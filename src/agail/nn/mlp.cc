@@ -59,13 +59,20 @@ ConstView<S> Mlp<S>::input(const ConstView<S>& x, const Tape<S>& tape, Index lay
 }
 
 template <class S>
-template <class Delta, class H>
-void Mlp<S>::multiply_by_slope(Delta&& delta, const H& h) const {
-  if (activation_ == Activation::kTanh)
-    delta.array() *= S(1) - h.array().square();
-  else
-    delta.array() *=
-        (h.array() > S(0)).template cast<S>() * static_cast<S>(1 - kLeak) + static_cast<S>(kLeak);
+void Mlp<S>::multiply_by_slope(Matrix<S>& delta, const Tape<S>& tape, Index layer, Index first,
+                               Index n) const {
+  const Matrix<S>& outputs = tape.outputs[static_cast<std::size_t>(layer)];
+  // Whole padded columns, whose further rows nobody reads.
+  using Column = Eigen::Array<S, Eigen::Dynamic, 1>;
+  for (Index j = 0; j < n; ++j) {
+    const Eigen::Map<const Column, Eigen::Aligned64> h(outputs.col(first + j).data(),
+                                                       outputs.rows());
+    Eigen::Map<Column, Eigen::Aligned64> d(delta.col(j).data(), outputs.rows());
+    if (activation_ == Activation::kTanh)
+      d *= S(1) - h.square();
+    else
+      d *= (h > S(0)).template cast<S>() * static_cast<S>(1 - kLeak) + static_cast<S>(kLeak);
+  }
 }
 
 template <class S>
@@ -104,8 +111,7 @@ void Mlp<S>::backward(const S* theta, const ConstView<S>& x, const Tape<S>& tape
     if (l > 0) {
       auto under = below->block(0, 0, in(l), n);
       multiply_transposed<S>(w, d, under);
-      multiply_by_slope(under,
-                        tape.outputs[static_cast<std::size_t>(l) - 1].block(0, first, in(l), n));
+      multiply_by_slope(*below, tape, l - 1, first, n);
       std::swap(delta, below);
     } else if (input_adjoint != nullptr) {
       multiply_transposed<S>(w, d, *input_adjoint);
@@ -128,7 +134,7 @@ void Mlp<S>::tangent(const S* theta, const S* v, const ConstView<S>& x, const Ta
     if (last(l))
       result = dz;
     else
-      multiply_by_slope(dz, tape.outputs[static_cast<std::size_t>(l)].block(0, first, out(l), n));
+      multiply_by_slope(*here, tape, l, first, n);
     std::swap(below, here);
   }
 }
@@ -149,7 +155,7 @@ double Mlp<S>::add_gradient_penalty(const S* theta, const ConstView<S>& x, const
   for (Index l = layers() - 1; l >= 0; --l) {
     auto under = below->block(0, 0, in(l), n);
     multiply_transposed<S>(weights(theta, l).leftCols(in(l)), delta->block(0, 0, out(l), n), under);
-    if (l > 0) multiply_by_slope(under, hidden(l - 1));
+    if (l > 0) multiply_by_slope(*below, tape, l - 1, first, n);
     std::swap(delta, below);
   }
   // u = d penalty / dg = 2 weight (|g| - 1) g / |g|, from here on a constant.
@@ -178,9 +184,8 @@ double Mlp<S>::add_gradient_penalty(const S* theta, const ConstView<S>& x, const
       multiply<S>(w, u, sl);
     else
       multiply<S>(w, t[i - 1].block(0, 0, in(l), n), sl);
-    auto tl = t[i].block(0, 0, out(l), n);
-    tl = sl;
-    multiply_by_slope(tl, hidden(l));
+    t[i].block(0, 0, out(l), n) = sl;
+    multiply_by_slope(t[i], tape, l, first, n);
   }
   Matrix<S>* s_bar = &scratch.c;
   Matrix<S>* t_bar = below;
@@ -205,11 +210,11 @@ double Mlp<S>::add_gradient_penalty(const S* theta, const ConstView<S>& x, const
     multiply_transposed<S>(w, sb, tb);
     multiply_transposed<S>(w, zb, hb);
     const auto h = hidden(l - 1);
-    multiply_by_slope(hb, h);
+    multiply_by_slope(*h_bar, tape, l - 1, first, n);
     if (activation_ == Activation::kTanh)  // f'' = -2 h (1 - h^2); zero for the leaky rectifier
       hb.array() -= S(2) * h.array() * (S(1) - h.array().square()) *
                     s[static_cast<std::size_t>(l) - 1].block(0, 0, in(l), n).array() * tb.array();
-    multiply_by_slope(tb, h);
+    multiply_by_slope(*t_bar, tape, l - 1, first, n);
     std::swap(s_bar, t_bar);
     std::swap(z_bar, h_bar);
   }

@@ -98,9 +98,10 @@ class Mlp {
   // Input of a layer with its row of ones.
   ConstView<S> input(const ConstView<S>& x, const Tape<S>& tape, Index layer, Index first,
                      Index n) const;
-  // delta *= f'(z), which f = tanh and the leaky rectifier tell from h = f(z).
-  template <class Delta, class H>
-  void multiply_by_slope(Delta&& delta, const H& h) const;
+  // delta *= f'(z) for the first n columns of delta, scratch space, and n columns of a hidden
+  // layer; tanh and the leaky rectifier tell f'(z) from h = f(z).
+  void multiply_by_slope(Matrix<S>& delta, const Tape<S>& tape, Index layer, Index first,
+                         Index n) const;
 
   std::vector<int> sizes_;
   Activation activation_;

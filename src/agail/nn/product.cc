@@ -1,6 +1,7 @@
 #include "agail/nn/product.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "agail/base/flops.h"
 
@@ -17,6 +18,7 @@ namespace {
 using Eigen::internal::padd;
 using Eigen::internal::ploadu;
 using Eigen::internal::pmadd;
+using Eigen::internal::predux;
 using Eigen::internal::pset1;
 using Eigen::internal::pstoreu;
 
@@ -92,18 +94,18 @@ template <class S, int P, int N>
     AGAIL_UNROLL
     for (int i = 0; i < P; ++i) {
       S* to = column + (i + 1 < P ? i * kWidth<S> : rows.last);
-      if (i + 1 < P || rows.from == 0) {
-        pstoreu(to, c.add ? padd(ploadu<Packet<S>>(to), sum[i][j]) : sum[i][j]);
+      if (!c.add) {  // lanes that overlap are the same sums once more
+        pstoreu(to, sum[i][j]);
+      } else if (i + 1 < P || rows.from == 0) {
+        pstoreu(to, padd(ploadu<Packet<S>>(to), sum[i][j]));
       } else {
         S lanes[kWidth<S>];
         pstoreu(lanes, sum[i][j]);
-        for (Index r = rows.from; r < kWidth<S>; ++r) to[r] = c.add ? to[r] + lanes[r] : lanes[r];
+        for (Index r = rows.from; r < kWidth<S>; ++r) to[r] += lanes[r];
       }
     }
   }
 }
-
-#undef AGAIL_UNROLL
 
 template <class S, int P>
 void panel_of_packets(Left<S> a, Right<S> b, Index depth, Index columns, Result<S> c, Rows rows) {
@@ -181,9 +183,113 @@ void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Inde
   }
 }
 
+// Few rows do not fill a packet: the products of a network's last layer, of which there are several
+// for each of the others.
+
+// Dot products of R rows, which lie `kRowStep` apart, with N columns of b, packets q to q + packets
+// of all; `start(q)` is where packet q begins in a column.
+template <class S, int R, int N, class Start>
+[[gnu::always_inline]] inline void dots(const S* rows, Index row_step, Right<S> b, Index packets,
+                                        const Start& start, Result<S> c) {
+  Packet<S> sum[R][N];
+  AGAIL_UNROLL
+  for (int i = 0; i < R; ++i) {
+    AGAIL_UNROLL
+    for (int j = 0; j < N; ++j) sum[i][j] = pset1<Packet<S>>(S(0));
+  }
+  for (Index q = 0; q < packets; ++q) {
+    Packet<S> left[R];
+    AGAIL_UNROLL
+    for (int i = 0; i < R; ++i) left[i] = ploadu<Packet<S>>(rows + i * row_step + q * kWidth<S>);
+    AGAIL_UNROLL
+    for (int j = 0; j < N; ++j) {
+      const auto right = ploadu<Packet<S>>(b.data + start(q) + j * b.column);
+      AGAIL_UNROLL
+      for (int i = 0; i < R; ++i) sum[i][j] = pmadd(left[i], right, sum[i][j]);
+    }
+  }
+  AGAIL_UNROLL
+  for (int j = 0; j < N; ++j) {
+    AGAIL_UNROLL
+    for (int i = 0; i < R; ++i) {
+      S& to = c.data[i + j * c.column];
+      to = c.add ? to + predux(sum[i][j]) : predux(sum[i][j]);
+    }
+  }
+}
+
+// c = a b for m < kWidth <= k: dot products of rows of a, copied to lie side by side, with columns
+// of b. The last packet overlaps the one before it; there a's copy holds zeros.
+template <class S>
+void multiply_few_rows(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add) {
+  constexpr Index kW = kWidth<S>;
+  constexpr Index kDots = 8 * kW;  // elements of a row at a time
+  constexpr int kRowsOfTile = 3, kColumnsOfTile = 4;
+  alignas(64) S rows[kW * kDots];
+  const Index m = a.rows(), k = a.cols(), n = b.cols();
+  for (Index p = 0; p < k; p += kDots) {
+    const Index depth = std::min(kDots, k - p);
+    const Index packets = (depth + kW - 1) / kW;
+    const Index overlap = packets * kW - depth;
+    const auto start = [&](Index q) { return p + q * kW - (q + 1 < packets ? 0 : overlap); };
+    for (Index i = 0; i < m; ++i) {
+      const S* from = a.data() + i + p * a.outerStride();
+      S* to = rows + i * kDots;
+      const Index whole = (packets - 1) * kW;
+      for (Index t = 0; t < whole; ++t) to[t] = from[t * a.outerStride()];
+      std::fill_n(to + whole, overlap, S(0));
+      for (Index t = whole; t < depth; ++t) to[t + overlap] = from[t * a.outerStride()];
+    }
+    const auto columns = [&]<int N>(Index j, std::integral_constant<int, N>) {
+      const Right<S> right{b.data() + j * b.outerStride(), 1, b.outerStride()};
+      for (Index i = 0; i < m;) {
+        const S* from = rows + i * kDots;
+        const Result<S> to{c.data() + i + j * c.outerStride(), c.outerStride(), add || p > 0};
+        const auto tile_of = [&]<int R>(std::integral_constant<int, R>) {
+          dots<S, R, N>(from, kDots, right, packets, start, to);
+          i += R;
+        };
+        if (m - i >= kRowsOfTile)
+          tile_of(std::integral_constant<int, kRowsOfTile>());
+        else if (m - i == 2)
+          tile_of(std::integral_constant<int, 2>());
+        else
+          tile_of(std::integral_constant<int, 1>());
+      }
+    };
+    Index j = 0;
+    for (; j + kColumnsOfTile <= n; j += kColumnsOfTile)
+      columns(j, std::integral_constant<int, kColumnsOfTile>());
+    for (; j < n; ++j) columns(j, std::integral_constant<int, 1>());
+  }
+}
+
+// c = a b^T for m < kWidth <= n, as the transpose of b a^T.
+template <class S>
+void multiply_few_rows_by_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S> c,
+                                     bool add) {
+  constexpr Index kRows = 128;
+  S transposed[kRows * kWidth<S>];
+  const Index m = a.rows(), k = a.cols(), n = b.rows();
+  for (Index done = 0; done < n; done += kRows) {
+    const Index first = std::max<Index>(0, std::min(done, n - kRows));
+    const Index rows = std::min(kRows, n - first);
+    multiply_any<S, Lies::kPlain>(b.data() + first, b.outerStride(), rows, k,
+                                  {a.data(), a.outerStride(), 1}, m, {transposed, rows, false});
+    for (Index r = done - first; r < rows; ++r)
+      for (Index i = 0; i < m; ++i) {
+        S& to = c(i, first + r);
+        const S value = transposed[r + i * rows];
+        to = add ? to + value : value;
+      }
+  }
+}
+
+#undef AGAIL_UNROLL
+
 }  // namespace
 
-// Few rows do not fill a packet; Eigen's products do as well there.
+// What fits none of the above is tiny: Eigen's.
 
 template <class S>
 void multiply(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add) {
@@ -193,6 +299,8 @@ void multiply(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add)
     multiply_any<S, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
                                   {b.data(), 1, b.outerStride()}, b.cols(),
                                   {c.data(), c.outerStride(), add});
+  else if (a.cols() >= kWidth<S>)
+    multiply_few_rows<S>(a, b, c, add);
   else if (add)
     c.noalias() += a * b;
   else
@@ -219,6 +327,8 @@ void multiply_by_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S
     multiply_any<S, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
                                   {b.data(), b.outerStride(), 1}, b.rows(),
                                   {c.data(), c.outerStride(), add});
+  else if (b.rows() >= kWidth<S> && a.cols() > 0)
+    multiply_few_rows_by_transposed<S>(a, b, c, add);
   else if (add)
     c.noalias() += a * b.transpose();
   else

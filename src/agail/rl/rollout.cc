@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <mutex>
 
 namespace agail {
 
@@ -48,18 +49,49 @@ void Collector::start_episode(Index index) {
   lane.environment->reset(random);
 }
 
-void Collector::collect_lane(Index index, const PolicyNetwork<float>& network,
-                             const Vector<float>& theta, const Normalizer& normalizer, Batch& batch,
-                             Worker& worker) {
+template <class Steps>
+void Collector::take_turns(Index count, Steps&& steps) {
+  const int threads = static_cast<int>(std::min<Index>(team_.pool().threads(), own_.size()));
+  const Index turn = threads == 1 ? count : 32;
+  const auto lanes = static_cast<std::size_t>(own_.size());
+  std::mutex mutex;
+  std::size_t next = 0, waiting = lanes;
+  turns_.resize(lanes);
+  for (std::size_t i = 0; i < lanes; ++i) turns_[i] = {own_.begin + static_cast<Index>(i), 0};
+  team_.pool().run(threads, [&](int, int worker) {
+    for (;;) {
+      Turn mine;
+      {
+        const std::lock_guard lock(mutex);
+        if (waiting == 0) return;
+        --waiting;
+        mine = turns_[next];
+        next = (next + 1) % lanes;
+      }
+      const Index end = std::min(mine.step + turn, count);
+      steps(mine.lane, worker, mine.step, end);
+      if (end == count) continue;
+      const std::lock_guard lock(mutex);
+      turns_[(next + waiting++) % lanes] = {mine.lane, end};
+    }
+  });
+}
+
+void Collector::act(Index index, const PolicyNetwork<float>& network, const Vector<float>& theta,
+                    const Normalizer& normalizer, Batch& batch, Worker& worker, Index first,
+                    Index end) {
   using Clock = std::chrono::steady_clock;
   Lane& lane = lanes_[static_cast<std::size_t>(index)];
   Environment& environment = *lane.environment;
   const ActionSpace& space = environment.spec().action;
-  lane.finished.clear();
-  lane.diverged = 0;
   double physics = 0;
   const Clock::time_point begin = Clock::now();
-  if (lane.episode < 0) start_episode(index);
+  if (first == 0) {
+    lane.finished.clear();
+    lane.diverged = 0;
+    lane.physics_seconds = lane.inference_seconds = 0;
+    if (lane.episode < 0) start_episode(index);
+  }
 
   const auto store = [&](Matrix<float>& matrix, Index column) {
     const std::span<const double> observation = environment.observation();
@@ -67,7 +99,7 @@ void Collector::collect_lane(Index index, const PolicyNetwork<float>& network,
     for (std::size_t i = 0; i < observation.size(); ++i) to[i] = static_cast<float>(observation[i]);
   };
 
-  for (Index t = 0; t < batch.steps; ++t) {
+  for (Index t = first; t < end; ++t) {
     const Index j = index * batch.steps + t;
     store(batch.observations, j);
     normalizer.apply(batch.observations.col(j).data(), batch.inputs.col(j).data());
@@ -98,8 +130,8 @@ void Collector::collect_lane(Index index, const PolicyNetwork<float>& network,
     }
     physics += std::chrono::duration<double>(Clock::now() - before).count();
   }
-  lane.physics_seconds = physics;
-  lane.inference_seconds = std::chrono::duration<double>(Clock::now() - begin).count() - physics;
+  lane.physics_seconds += physics;
+  lane.inference_seconds += std::chrono::duration<double>(Clock::now() - begin).count() - physics;
 }
 
 void Collector::collect(const PolicyNetwork<float>& network, const Vector<float>& theta,
@@ -107,9 +139,9 @@ void Collector::collect(const PolicyNetwork<float>& network, const Vector<float>
   while (workers_.size() < static_cast<std::size_t>(team_.pool().threads()))
     workers_.push_back({network.mlp.make_tape(1),
                         std::vector<float>(static_cast<std::size_t>(spec().action.dim))});
-  team_.pool().run(static_cast<int>(own_.size()), [&](int task, int worker) {
-    collect_lane(own_.begin + task, network, theta, normalizer, batch,
-                 workers_[static_cast<std::size_t>(worker)]);
+  take_turns(batch.steps, [&](Index lane, int worker, Index first, Index end) {
+    act(lane, network, theta, normalizer, batch, workers_[static_cast<std::size_t>(worker)], first,
+        end);
   });
   if (team_.ranks() > 1) exchange_batch(normalizer, batch);
   batch.finished.clear();
@@ -129,12 +161,11 @@ void Collector::collect(const PolicyNetwork<float>& network, const Vector<float>
 }
 
 void Collector::replay(const Batch& batch) {
-  team_.pool().run(static_cast<int>(own_.size()), [&](int task, int) {
-    const Index index = own_.begin + task;
+  take_turns(batch.steps, [&](Index index, int, Index first, Index end) {
     Lane& lane = lanes_[static_cast<std::size_t>(index)];
     std::vector<float> executed(static_cast<std::size_t>(spec().action.dim));
     if (lane.episode < 0) start_episode(index);
-    for (Index t = 0; t < batch.steps; ++t) {
+    for (Index t = first; t < end; ++t) {
       clip_action(spec().action, batch.actions.col(index * batch.steps + t).data(),
                   executed.data());
       const StepResult result = lane.environment->step(executed);

@@ -84,8 +84,12 @@ class Collector {
     Tape<float> tape;
     std::vector<float> executed;
   };
-  void collect_lane(Index index, const PolicyNetwork<float>& network, const Vector<float>& theta,
-                    const Normalizer& normalizer, Batch& batch, Worker& worker);
+  // Calls steps(lane, worker, first, end) until each of this rank's lanes has done its `count`
+  // steps: some at a time, so that at the end no thread is left with a whole lane.
+  template <class Steps>
+  void take_turns(Index count, Steps&& steps);
+  void act(Index index, const PolicyNetwork<float>& network, const Vector<float>& theta,
+           const Normalizer& normalizer, Batch& batch, Worker& worker, Index first, Index end);
   void start_episode(Index index);
 
   // From every rank to every rank (rollout_exchange.cc): what the lanes collected, and their
@@ -103,6 +107,10 @@ class Collector {
   Team team_;
   Share own_;  // this rank's lanes
   std::vector<Lane> lanes_;
+  struct Turn {
+    Index lane, step;
+  };
+  std::vector<Turn> turns_;  // a ring: lanes waiting for their turn
   std::vector<Worker> workers_;
   Bytes message_;
   Blocks all_;

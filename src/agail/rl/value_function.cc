@@ -66,15 +66,15 @@ void ValueFunction::fit(const Matrix<float>& x, const Vector<float>& targets, In
     shuffle(order_, random);
     for (Index start = 0; start < n; start += settings_.minibatch) {
       const Index size = std::min<Index>(settings_.minibatch, n - start);
-      for (Index j = 0; j < size; ++j) {
-        const Index from = order_[static_cast<std::size_t>(start + j)];
-        minibatch_x_.col(j).head(rows) = x.col(from).head(rows);
-        minibatch_target_[j] =
-            (targets[from] - static_cast<float>(mean_)) / static_cast<float>(std_);
-      }
       const auto gradient =
           sums_.sum(team_, size, [&](Index, int w, Index first, Index count, float* out) {
             Worker& worker = workers_[static_cast<std::size_t>(w)];
+            for (Index j = first; j < first + count; ++j) {
+              const Index from = order_[static_cast<std::size_t>(start + j)];
+              minibatch_x_.col(j).head(rows) = x.col(from).head(rows);
+              minibatch_target_[j] =
+                  (targets[from] - static_cast<float>(mean_)) / static_cast<float>(std_);
+            }
             const auto columns = minibatch_x_.block(0, first, rows, count);
             mlp_.forward(theta_.data(), columns, tape_, first);
             View<float> adjoint = worker.adjoint.leftCols(count);
@@ -82,7 +82,7 @@ void ValueFunction::fit(const Matrix<float>& x, const Vector<float>& targets, In
                       static_cast<float>(size);
             mlp_.backward(theta_.data(), columns, tape_, first, adjoint, out, worker.scratch);
           });
-      adam_.descend(theta_, gradient, settings_.learning_rate);
+      adam_.descend(team_.pool(), theta_, gradient, settings_.learning_rate);
     }
   }
 }
