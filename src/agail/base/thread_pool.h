@@ -2,7 +2,9 @@
 // chance, so results must depend on the task's number only (see design: exactness).
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <memory>
@@ -36,6 +38,19 @@ class ThreadPool {
           (*static_cast<Function*>(function))(task, worker);
         },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
+  }
+
+  // Calls f(first, count) for blocks of `block` numbers that make up [0, n), as one task a thread:
+  // for work so light that handing out the blocks one by one would cost more.
+  template <class F>
+  void run_blocks(std::ptrdiff_t n, std::ptrdiff_t block, F&& f) {
+    const std::ptrdiff_t blocks = (n + block - 1) / block;
+    const auto tasks = static_cast<int>(std::min<std::ptrdiff_t>(threads(), blocks));
+    run(tasks, [&](int task, int) {
+      const std::ptrdiff_t end = blocks * (task + 1) / tasks;
+      for (std::ptrdiff_t b = blocks * task / tasks; b < end; ++b)
+        f(b * block, std::min(block, n - b * block));
+    });
   }
 
  private:

@@ -27,10 +27,7 @@ class Adam {
     constexpr auto b1 = static_cast<S>(kBeta1);
     constexpr auto b2 = static_cast<S>(kBeta2);
     constexpr Index kBlock = 1024;  // one pass over memory
-    const Index blocks = (theta.size() + kBlock - 1) / kBlock;
-    pool.run(static_cast<int>(blocks), [&](int block, int) {
-      const Index i = block * kBlock;
-      const Index n = std::min(kBlock, theta.size() - i);
+    pool.run_blocks(theta.size(), kBlock, [&](Index i, Index n) {
       auto m = first_.segment(i, n).array();
       auto v = second_.segment(i, n).array();
       const auto g = gradient.segment(i, n).array();

@@ -52,12 +52,9 @@ class ChunkSums {
       const Index first = chunk * kChunk;
       body(chunk, worker, first, std::min(kChunk, samples - first), partial_.col(chunk).data());
     });
-    constexpr Index kRows =
-        1024;  // rows added at a time, so that they stay in the first-level cache
-    const Index parts = (values_ + kRows - 1) / kRows;
-    pool.run(static_cast<int>(parts), [&](int part, int) {
-      const Index first = part * kRows;
-      add_along_tree(partial_, chunks, own, first, std::min(kRows, values_ - first));
+    constexpr Index kRows = 1024;  // at a time, so that they stay in the first-level cache
+    pool.run_blocks(values_, kRows, [&](Index first, Index rows) {
+      add_along_tree(partial_, chunks, own, first, rows);
     });
     if (team.spreads(chunks))
       add_along_ranks(team.communicator(), chunks, values_, partial_, message_);
