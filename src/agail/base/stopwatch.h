@@ -30,6 +30,12 @@ inline constexpr std::array<const char*, static_cast<std::size_t>(Phase::kCount)
 
 class Stopwatch {
  public:
+  // Starts an update, as its phase kRest; what happened since the last one ended is not counted.
+  void begin_update() {
+    since_ = Clock::now();
+    flops_before_ = counted_flops().load(std::memory_order_relaxed);
+    phase_ = Phase::kRest;
+  }
   void start(Phase phase) {
     const Clock::time_point now = Clock::now();
     seconds_[static_cast<std::size_t>(phase_)] +=

@@ -127,7 +127,7 @@ UpdateReport Trainer::update() {
   const Index n = batch_.size();
   const auto number = static_cast<std::uint32_t>(updates_);
   UpdateReport report;
-  stopwatch_.start(Phase::kRest);
+  stopwatch_.begin_update();
 
   // Roll out the policy.
   collector_.collect(network_, theta_, normalizer_, batch_, stopwatch_);
