@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <fstream>
-#include <sstream>
-#include <string>
+
+#include "agail/base/cgroup.h"
 
 namespace agail {
 namespace {
@@ -31,39 +31,13 @@ double read_v1(const fs::path& group) {
   return read ? quota / period : 0;
 }
 
-// Every group from `name` up to the root may have its own limit. In a container the outer part of
-// the name may not be visible; then only the root is found, which is the container's own group.
-template <class Read>
-void tighten_upwards(double& quota, const fs::path& root, const std::string& name, Read read) {
-  for (fs::path group = fs::path(name).relative_path();; group = group.parent_path()) {
-    tighten(quota, read(root / group));
-    if (group.empty()) return;
-  }
-}
-
-bool has_controller(const std::string& list, const std::string& controller) {
-  return ("," + list + ",").find("," + controller + ",") != std::string::npos;
-}
-
 }  // namespace
 
 double cgroup_cpu_quota(const fs::path& mount, std::string_view membership) {
   double quota = 0;
-  std::istringstream lines{std::string(membership)};
-  for (std::string line; std::getline(lines, line);) {  // hierarchy:controllers:group
-    const auto first = line.find(':');
-    const auto second = first == std::string::npos ? first : line.find(':', first + 1);
-    if (second == std::string::npos) continue;
-    const std::string controllers = line.substr(first + 1, second - first - 1);
-    const std::string group = line.substr(second + 1);
-    if (controllers.empty()) {
-      tighten_upwards(quota, mount, group, read_v2);
-      tighten_upwards(quota, mount / "unified", group, read_v2);
-    } else if (has_controller(controllers, "cpu")) {
-      tighten_upwards(quota, mount / "cpu", group, read_v1);
-      tighten_upwards(quota, mount / "cpu,cpuacct", group, read_v1);
-    }
-  }
+  visit_cgroups(mount, membership, "cpu", [&](const fs::path& group, CgroupVersion version) {
+    tighten(quota, version == CgroupVersion::kV2 ? read_v2(group) : read_v1(group));
+  });
   return quota;
 }
 
@@ -72,10 +46,7 @@ int default_threads() {
   CPU_ZERO(&set);
   // Fails on machines with more than 1024 CPUs; then only the quota counts.
   int threads = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1024;
-  std::ifstream file("/proc/self/cgroup");
-  std::ostringstream membership;
-  membership << file.rdbuf();
-  const double quota = cgroup_cpu_quota("/sys/fs/cgroup", membership.str());
+  const double quota = cgroup_cpu_quota("/sys/fs/cgroup", cgroup_membership());
   if (quota > 0) threads = std::min(threads, static_cast<int>(std::min(quota, 1024.0)));
   return std::max(threads, 1);
 }

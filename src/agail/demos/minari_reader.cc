@@ -9,6 +9,7 @@
 
 #include "agail/base/atomic_file.h"
 #include "agail/base/error.h"
+#include "agail/base/memory_limit.h"
 #include "agail/demos/dataset_location.h"
 #include "agail/demos/gymnasium_spec.h"
 #include "agail/demos/hdf5.h"
@@ -119,22 +120,35 @@ DemoEpisode finish(RawEpisode raw, const ActionSpace& space) {
   DemoEpisode episode = std::move(raw.rest);
   episode.observations = std::move(raw.observations);
   const double missing = space.discrete ? 0.0 : std::numeric_limits<double>::quiet_NaN();
-  episode.actions.setConstant(steps, space.dim, missing);
   episode.available.setZero(steps, space.dim);
-  if (!raw.actions) return episode;
+  if (!raw.actions) {
+    episode.actions.setConstant(steps, space.dim, missing);
+    return episode;
+  }
+  episode.actions = std::move(*raw.actions);
   for (Eigen::Index t = 0; t < steps; ++t) {
     for (Eigen::Index k = 0; k < space.dim; ++k) {
-      const double action = (*raw.actions)(t, k);
+      double& action = episode.actions(t, k);
       const bool known =
           !std::isnan(action) &&
           (!raw.available || (*raw.available)(t, raw.available->cols() == 1 ? 0 : k) == 1);
-      if (!known) continue;
-      if (space.discrete) check_discrete(raw, t, action, space);
-      episode.actions(t, k) = action;
-      episode.available(t, k) = 1;
+      if (known && space.discrete) check_discrete(raw, t, action, space);
+      if (!known) action = missing;
+      episode.available(t, k) = known ? 1 : 0;
     }
   }
   return episode;
+}
+
+// Demonstrations are held in memory; whether they fit is found out before anything is read.
+void check_memory(const hdf5::Group& root, const std::vector<std::string>& names) {
+  std::uint64_t kept = 0, passing = 0;
+  for (const std::string& name : names) {
+    const EpisodeMemory memory = memory_of_episode(root.group(name));
+    kept += memory.kept;
+    passing = std::max(passing, memory.passing);
+  }
+  require_memory(kept + passing, root.where());
 }
 
 Demonstrations read(const hdf5::Group& root, const json& metadata, const std::string& where) {
@@ -145,6 +159,7 @@ Demonstrations read(const hdf5::Group& root, const json& metadata, const std::st
     throw InputError(where + " says there are " + metadata["total_episodes"].dump() +
                      " episodes, the file holds " + std::to_string(names.size()) +
                      "; it is incomplete, copy or record it again");
+  check_memory(root, names);
 
   Demonstrations demonstrations;
   demonstrations.environment = environment_of(metadata, where);

@@ -1,5 +1,6 @@
 #include "agail/demos/read_episode.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "agail/base/error.h"
@@ -102,7 +103,7 @@ void read_mask(const Group& group, RawEpisode& episode) {
     throw InputError(where + " has shape " + text_of(table.info.shape) + "; expected " +
                      std::to_string(steps + 1) +
                      " rows of one entry, or of one an action dimension");
-  RowMatrix<double> mask = table.values.topRows(steps);
+  const auto mask = table.values.topRows(steps);
   if (!((mask.array() == 0) || (mask.array() == 1)).all())
     throw InputError(where + " has values other than 0 (missing) and 1 (known)");
   if (!episode.actions) return;
@@ -111,7 +112,7 @@ void read_mask(const Group& group, RawEpisode& episode) {
       if (std::isnan((*episode.actions)(t, k)) && mask(t, columns == 1 ? 0 : k) == 1)
         throw InputError(where + " says 1 (known) for step " + std::to_string(t) +
                          ", where the action is NaN; set it to 0");
-  episode.available = std::move(mask);
+  episode.available = mask.cast<std::uint8_t>();
 }
 
 void read_rewards(const Group& group, RawEpisode& episode) {
@@ -137,7 +138,29 @@ std::vector<std::uint8_t> read_flags(const Group& group, const std::string& name
   return flags;
 }
 
+std::uint64_t entries(const Group& group, const std::string& name) {
+  if (group.kind(name) != Kind::kDataset) return 0;
+  std::uint64_t count = 1;
+  for (const std::size_t size : group.describe(name).shape) count *= size;
+  return count;
+}
+
 }  // namespace
+
+EpisodeMemory memory_of_episode(const Group& group) {
+  constexpr std::uint64_t kNumber = sizeof(double), kFlag = sizeof(std::uint8_t);
+  const std::uint64_t actions = entries(group, "actions");
+  const std::uint64_t rewards = entries(group, "rewards");
+  const std::uint64_t flags = entries(group, "terminations") + entries(group, "truncations");
+  const bool has_infos = group.kind("infos") == Kind::kGroup;
+  const std::uint64_t mask = has_infos ? entries(group.group("infos"), "action_available") : 0;
+  EpisodeMemory memory;
+  memory.kept = kNumber * (entries(group, "observations") + actions + rewards) +
+                kFlag * (actions + mask + flags);
+  // Whatever is not kept as numbers is read as numbers first.
+  memory.passing = kNumber * std::max({rewards, flags, mask});
+  return memory;
+}
 
 RawEpisode read_episode(const Group& group) {
   RawEpisode episode;

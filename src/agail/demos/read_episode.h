@@ -14,14 +14,24 @@ struct RawEpisode {
   RowMatrix<double> observations;  // (T+1) x observation_dim, finite
   std::optional<RowMatrix<double>>
       actions;  // T x action_dim, NaN or finite; absent: the file has none
-  std::optional<RowMatrix<double>> available;  // T x 1 or T x action_dim, 0 or 1; absent: no mask
-  DemoEpisode rest;                            // rewards, terminations, truncations, seed
+  std::optional<RowMatrix<std::uint8_t>>
+      available;     // T x 1 or T x action_dim, 0 or 1; absent: no mask
+  DemoEpisode rest;  // rewards, terminations, truncations, seed
   bool observations_are_float32 = false;
   bool actions_are_float32 = false;
   bool actions_are_integers = false;
 
   Eigen::Index steps() const { return observations.rows() - 1; }
 };
+
+// What reading an episode will take, in bytes.
+struct EpisodeMemory {
+  std::uint64_t kept = 0;     // as long as the demonstrations are there
+  std::uint64_t passing = 0;  // on top, while it is read
+};
+
+// From the shapes alone. Throws InputError where a dataset cannot be described.
+EpisodeMemory memory_of_episode(const hdf5::Group& group);
 
 // Throws InputError (what, where, how to mend it) for whatever does not fit Minari's layout.
 RawEpisode read_episode(const hdf5::Group& group);

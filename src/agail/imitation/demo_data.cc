@@ -8,14 +8,14 @@ DemoData::DemoData(const Demonstrations& demos) {
   const Index n = demos.transitions();
   const Index dim = demos.action.dim;
   states.resize(demos.observation_dim, n);
-  next_states.resize(demos.observation_dim, n);
+  final_states.resize(demos.observation_dim, static_cast<Index>(demos.episodes.size()));
+  ends.assign(static_cast<std::size_t>(n), -1);
   actions.setZero(dim, n);
   available.setZero(dim, n);
-  Index column = 0;
+  Index column = 0, number = 0;
   for (const DemoEpisode& episode : demos.episodes) {
     for (Index t = 0; t < episode.steps(); ++t, ++column) {
       states.col(column) = episode.observations.row(t).transpose().cast<float>();
-      next_states.col(column) = episode.observations.row(t + 1).transpose().cast<float>();
       Index known = 0;
       for (Index i = 0; i < dim; ++i) {
         if (episode.available(t, i) == 0) continue;  // what stands in a missing entry is never read
@@ -26,7 +26,17 @@ DemoData::DemoData(const Demonstrations& demos) {
       if (known > 0) some_action.push_back(column);
       if (known == dim && dim > 0) full_action.push_back(column);
     }
+    if (episode.steps() > 0)
+      ends[static_cast<std::size_t>(column - 1)] = static_cast<std::int32_t>(number);
+    final_states.col(number++) = episode.observations.bottomRows(1).transpose().cast<float>();
   }
+}
+
+std::uint64_t DemoData::memory(const Demonstrations& demos) {
+  const auto n = static_cast<std::uint64_t>(demos.transitions());
+  const auto numbers = static_cast<std::uint64_t>(demos.observation_dim + 2 * demos.action.dim);
+  return n * (sizeof(float) * numbers + sizeof(std::int32_t) + 2 * sizeof(Index)) +
+         sizeof(float) * demos.episodes.size() * static_cast<std::uint64_t>(demos.observation_dim);
 }
 
 void encode_action(const ActionSpace& space, const float* action, float* encoded) {

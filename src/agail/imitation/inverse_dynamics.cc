@@ -12,7 +12,10 @@ RegressionReport infer_missing_actions(const DemoData& demos, const ActionSpace&
   const Index n = demos.size();
   // The network sees s and s' - s, each in units of its own deviation: the difference is what an
   // action makes.
-  const Matrix<float> differences = demos.next_states - demos.states;
+  Matrix<float> differences(dim, n);
+  for (Index j = 0; j < n; ++j)
+    differences.col(j) =
+        Eigen::Map<const Vector<float>>(demos.next_state(j), dim) - demos.states.col(j);
   Normalizer state_normalizer(dim, true, clip);
   state_normalizer.update(pool, demos.states);
   Vector<double> scale(dim);
@@ -44,12 +47,14 @@ RegressionReport infer_missing_actions(const DemoData& demos, const ActionSpace&
   available = demos.available;
   const Vector<float> known =
       demos.available.rowwise().maxCoeff();  // dimensions that some demonstration tells
-  Tape<float> tape = network.mlp.make_tape(n);
-  for_each_chunk(pool, n, [&](int, Index first, Index count) {
-    network.mlp.forward(theta.data(), x.block(0, first, 2 * dim + 1, count), tape, first);
+  std::vector<Tape<float>> tapes;  // one of all demonstrations would be many times their size
+  for (int i = 0; i < pool.threads(); ++i) tapes.push_back(network.mlp.make_tape(kChunk));
+  for_each_chunk(pool, n, [&](int worker, Index first, Index count) {
+    Tape<float>& tape = tapes[static_cast<std::size_t>(worker)];
+    network.mlp.forward(theta.data(), x.block(0, first, 2 * dim + 1, count), tape, 0);
     std::vector<float> guess(static_cast<std::size_t>(action.dim));
     for (Index j = first; j < first + count; ++j) {
-      network.distribution.mode(tape.outputs.back().col(j).data(), guess.data());
+      network.distribution.mode(tape.outputs.back().col(j - first).data(), guess.data());
       clip_action(action, guess.data(), guess.data());
       for (Index i = 0; i < action.dim; ++i) {
         if (demos.available(i, j) == 0 && known[i] != 0)

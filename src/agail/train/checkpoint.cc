@@ -8,7 +8,6 @@
 #include "agail/comm/collectives.h"
 #include "agail/comm/together.h"
 #include "agail/config/resolve.h"
-#include "agail/demos/minari_writer.h"
 #include "agail/train/safetensors.h"
 
 namespace agail {
@@ -17,7 +16,8 @@ namespace {
 
 constexpr const char* kFormat = "agail-checkpoint-1";
 
-std::map<std::string, std::string> identity(const TrainingTask& task) {
+std::map<std::string, std::string> identity(const Trainer& trainer) {
+  const TrainingTask& task = trainer.task();
   // A run may be made longer, and saved more or less often, without becoming another.
   Settings settings = task.settings;
   settings.run.timesteps = 1;
@@ -28,10 +28,8 @@ std::map<std::string, std::string> identity(const TrainingTask& task) {
                                                {"seed", std::to_string(task.seed)},
                                                {"settings", to_toml(settings)},
                                                {"demonstrations", "none"}};
-  if (task.demonstrations) {
-    const std::vector<std::uint8_t> bytes = encode_demonstrations(*task.demonstrations);
-    result["demonstrations"] = "crc32c:" + std::to_string(crc32c(bytes));
-  }
+  if (trainer.demonstrations())
+    result["demonstrations"] = "crc32c:" + std::to_string(trainer.demonstrations()->fingerprint);
   return result;
 }
 
@@ -42,8 +40,8 @@ void walk(Archive& archive, Trainer& trainer, double& best_return) {
 
 }  // namespace
 
-CheckpointFile::CheckpointFile(const std::filesystem::path& folder, const TrainingTask& task)
-    : file_(folder / "checkpoints" / "latest.safetensors"), identity_(identity(task)) {}
+CheckpointFile::CheckpointFile(const std::filesystem::path& folder, const Trainer& trainer)
+    : file_(folder / "checkpoints" / "latest.safetensors"), identity_(identity(trainer)) {}
 
 std::uint32_t CheckpointFile::fingerprint() const {
   std::string text = std::string(kVersion) + " " + cpu_features();

@@ -13,7 +13,7 @@ namespace agail {
 class CheckpointFile {
  public:
   // In `folder`/checkpoints. What identifies the task is taken once, here.
-  CheckpointFile(const std::filesystem::path& folder, const TrainingTask& task);
+  CheckpointFile(const std::filesystem::path& folder, const Trainer& trainer);
 
   // Of the task, the version and the machine's instructions: ranks that train together must agree.
   std::uint32_t fingerprint() const;

@@ -81,12 +81,12 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
   };
   regression("inverse_dynamics", trainer.inverse_dynamics());
   regression("cloning", trainer.cloning());
-  if (task.demonstrations) {
-    summary["demonstrations"] = {{"episodes", task.demonstrations->episodes.size()},
-                                 {"transitions", task.demonstrations->transitions()},
-                                 {"missing_ratio", task.demonstrations->missing_ratio()}};
-    if (task.demonstrations->has_rewards())
-      summary["demonstrations"]["mean_return"] = task.demonstrations->mean_return();
+  if (const auto& demonstrations = trainer.demonstrations()) {
+    summary["demonstrations"] = {{"episodes", demonstrations->episodes},
+                                 {"transitions", demonstrations->transitions},
+                                 {"missing_ratio", demonstrations->missing_ratio}};
+    if (demonstrations->mean_return)
+      summary["demonstrations"]["mean_return"] = *demonstrations->mean_return;
   }
   summary["version"] = kVersion;
   summary["mujoco"] = physics_version();
@@ -160,7 +160,7 @@ class Run {
 
 bool Run::prepare() {
   if (interrupted_anywhere()) return false;
-  checkpoint_.emplace(folder_, trainer_->task());
+  checkpoint_.emplace(folder_, *trainer_);
   const int other = first_that_differs(communicator_, checkpoint_->fingerprint());
   together(communicator_, [&] {
     if (other >= 0)

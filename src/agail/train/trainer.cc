@@ -4,6 +4,8 @@
 #include <limits>
 #include <numeric>
 
+#include "agail/base/memory_limit.h"
+
 namespace agail {
 
 namespace {
@@ -81,8 +83,11 @@ void Trainer::check() {
 void Trainer::start() {
   const Settings& settings = task_.settings;
   if (task_.method == "trpo") return;
+  require_memory(DemoData::memory(*task_.demonstrations), "training on these demonstrations");
+  demonstrations_ = summarise(*task_.demonstrations);
   demos_ = std::make_unique<DemoData>(*task_.demonstrations);
-  const double missing = task_.demonstrations->missing_ratio();
+  task_.demonstrations.reset();  // with many of them, half of the memory
+  const double missing = demonstrations_->missing_ratio;
   const bool adversarial = task_.method != "bc";
   if (adversarial)
     reward_ = std::make_unique<AdversarialReward>(task_.method, *demos_, spec_.action, missing,
@@ -189,8 +194,7 @@ UpdateReport Trainer::update() {
 
 SavedPolicy Trainer::policy() const {
   PolicyInfo info{spec_.id, task_.method, timesteps_, task_.settings_toml, {}};
-  if (task_.demonstrations && task_.demonstrations->has_rewards())
-    info.demonstrations_mean_return = task_.demonstrations->mean_return();
+  if (demonstrations_) info.demonstrations_mean_return = demonstrations_->mean_return;
   return {std::move(info), spec_.observation_dim,
           spec_.action,    task_.settings.policy.hidden,
           normalizer_,     theta_};

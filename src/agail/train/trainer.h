@@ -7,6 +7,7 @@
 #include <string>
 
 #include "agail/base/stopwatch.h"
+#include "agail/demos/demonstrations_summary.h"
 #include "agail/imitation/agail.h"
 #include "agail/imitation/behavior_cloning.h"
 #include "agail/imitation/inverse_dynamics.h"
@@ -23,7 +24,7 @@ struct TrainingTask {
   std::string settings_toml;
   std::uint64_t seed = 0;
   int threads = 1;
-  std::optional<Demonstrations> demonstrations;  // all methods but trpo
+  std::optional<Demonstrations> demonstrations;  // all methods but trpo; a Trainer takes them
 };
 
 // What one update did. Parts that do not exist are absent.
@@ -62,6 +63,9 @@ class Trainer {
   Team team() const { return team_; }
   SavedPolicy policy() const;
 
+  // Absent for trpo.
+  const std::optional<DemonstrationsSummary>& demonstrations() const { return demonstrations_; }
+
   // How the policy was cloned, and how missing actions were inferred before that.
   const std::optional<RegressionReport>& cloning() const { return cloning_; }
   const std::optional<RegressionReport>& inverse_dynamics() const { return inverse_dynamics_; }
@@ -82,6 +86,7 @@ class Trainer {
   EnvironmentSpec spec_;
   ThreadPool pool_;
   Team team_;
+  std::optional<DemonstrationsSummary> demonstrations_;
   std::unique_ptr<DemoData> demos_;
   PolicyNetwork<float> network_;
   Vector<float> theta_;

@@ -1,0 +1,36 @@
+#include "agail/imitation/demo_data.h"
+
+#include <gtest/gtest.h>
+
+#include "imitation/support.h"
+
+namespace agail {
+namespace {
+
+TEST(DemoData, TheNextStateOfALastStepIsTheEpisodesLastObservation) {
+  const Demonstrations demonstrations = random_demonstrations("Hopper-v5", 3, 1);
+  const DemoData data(demonstrations);
+  Index column = 0;
+  for (const DemoEpisode& episode : demonstrations.episodes)
+    for (Index t = 0; t < episode.steps(); ++t, ++column) {
+      const Eigen::Map<const Vector<float>> next(data.next_state(column), data.states.rows());
+      EXPECT_EQ(data.states.col(column), episode.observations.row(t).transpose().cast<float>());
+      EXPECT_EQ(next, episode.observations.row(t + 1).transpose().cast<float>());
+    }
+  EXPECT_EQ(column, data.size());
+}
+
+TEST(DemoData, SaysHowLargeItWillBe) {
+  const Demonstrations demonstrations = random_demonstrations("Hopper-v5", 3, 1);
+  const DemoData data(demonstrations);
+  const auto size = [](const auto& values) {
+    return static_cast<std::uint64_t>(values.size()) * sizeof(*values.data());
+  };
+  EXPECT_EQ(DemoData::memory(demonstrations), size(data.states) + size(data.actions) +
+                                                  size(data.available) + size(data.final_states) +
+                                                  size(data.ends) + size(data.some_action) +
+                                                  size(data.full_action));
+}
+
+}  // namespace
+}  // namespace agail
