@@ -1,4 +1,6 @@
 // agail bench: what training costs over pure stepping.
+#include <sys/resource.h>
+
 #include <chrono>
 #include <cstdio>
 #include <iostream>
@@ -11,8 +13,9 @@
 #include "agail/comm/together.h"
 #include "agail/config/resolve.h"
 #include "agail/demos/mask.h"
-#include "agail/train/evaluation.h"
 #include "agail/train/trainer.h"
+#include "bench_demos.h"
+#include "bench_stepping.h"
 #include "commands.h"
 #include "peak.h"
 
@@ -21,6 +24,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using nlohmann::ordered_json;
+
+// The most memory that this process has had at a time.
+std::int64_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024 * static_cast<std::int64_t>(usage.ru_maxrss);
+}
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -31,8 +41,9 @@ struct Options {
   std::string method = "agail", preset = "paper";
   std::vector<std::string> assignments;
   double missing = 0.5;
+  std::int64_t demonstrations = 0;
   int updates = 60, threads = 1;
-  bool json = false;
+  bool only_stepping = false, json = false;
 };
 
 TrainingTask make_task(const Options& options, const std::string& environment) {
@@ -42,14 +53,9 @@ TrainingTask make_task(const Options& options, const std::string& environment) {
   task.settings = resolve_settings({options.preset, environment, options.assignments});
   task.settings_toml = to_toml(task.settings);
   task.threads = options.threads;
-  if (options.method == "trpo") return task;
-  // Demonstrations of an untrained policy: what they show does not matter to what learning from
-  // them costs.
-  TrainingTask plain = task;
-  plain.method = "trpo";
-  Trainer untrained(std::move(plain));
-  ThreadPool pool(1);
-  Demonstrations demos = record(untrained.policy(), 100, 0, true, pool);
+  if (options.method == "trpo" || options.only_stepping) return task;
+  // What demonstrations show does not matter to what learning from them costs.
+  Demonstrations demos = untrained_demonstrations(task, options.demonstrations);
   remove_actions(
       demos, {.pattern = MaskPattern::kStep, .ratio = options.missing, .seed = 0, .dimension = {}});
   task.demonstrations = std::move(demos);
@@ -127,7 +133,10 @@ ordered_json measure(const Options& options, Trainer& trainer) {
                          {"split_us", split},
                          {"gflops", gflops},
                          {"peak_gflops", 1e-9 * peak_flops_per_second()},
+                         {"peak_memory_bytes", peak_memory_bytes()},
                          {"signature", signature}};
+  if (trainer.demonstrations())
+    result["demonstration_transitions"] = trainer.demonstrations()->transitions;
   if (communicator.ranks() == 1) return result;
   const Traffic total = total_of(communicator, traffic);
   const auto updates = static_cast<double>(options.updates);
@@ -139,9 +148,23 @@ ordered_json measure(const Options& options, Trainer& trainer) {
   return result;
 }
 
+void run_stepping(const Options& options, Communicator& communicator) {
+  ordered_json results = ordered_json::array();
+  for (const std::string& environment : options.environments) {
+    TrainingTask task;
+    together(communicator, [&] { task = make_task(options, environment); });
+    results.push_back(measure_stepping(task, options.updates, communicator));
+    if (options.json) continue;
+    std::printf("%s: stepping %.2f us under uniform actions, %d threads\n", environment.c_str(),
+                results.back()["stepping_us"].get<double>(), options.threads);
+  }
+  if (options.json) std::cout << results.dump(2) << "\n";
+}
+
 void run(Options options, Communicator& communicator) {
   if (options.environments.empty())
     options.environments = {"Hopper-v5", "Walker2d-v5", "Humanoid-v4"};
+  if (options.only_stepping) return run_stepping(options, communicator);
   ordered_json results = ordered_json::array();
   for (const std::string& environment : options.environments) {
     std::unique_ptr<Trainer> trainer;
@@ -188,6 +211,12 @@ void add_bench(CLI::App& app, Communicator& communicator) {
   command->add_option("--set", options->assignments, "key=value, for any setting")
       ->allow_extra_args(false);
   command->add_option("--missing", options->missing, "Share of missing actions, default 0.5");
+  command
+      ->add_option("--demonstrations", options->demonstrations,
+                   "Transitions of the demonstrations, default those of 100 episodes")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--only-stepping", options->only_stepping,
+                    "No training: step through uniformly random actions");
   command->add_option("--updates", options->updates, "Updates to measure, default 60")
       ->check(CLI::PositiveNumber);
   command->add_option("--threads", options->threads, "Default 1")->check(CLI::Range(1, 4096));
