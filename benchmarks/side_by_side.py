@@ -186,6 +186,12 @@ RATIOS = [
         ["imitation GAIL, 1 environment", "imitation GAIL, 8 environments"],
         (20, 7),
     ),
+    (
+        "GAIL, their 1 environment",
+        "agail GAIL",
+        ["imitation GAIL, 1 environment"],
+        (20, 7),
+    ),
     ("stepping", "agail stepping", ["EnvPool stepping"], (1, 1)),
     ("training against bare stepping", "agail AGAIL", ["EnvPool stepping"], (0.9, 0.9)),
 ]

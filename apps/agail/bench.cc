@@ -62,27 +62,28 @@ TrainingTask make_task(const Options& options, const std::string& environment) {
   return task;
 }
 
+// What was measured, summed over the updates.
+struct Measured {
+  double training = 0, stepping = 0;  // seconds
+  std::array<double, kPhaseNames.size()> seconds{};
+  std::array<std::int64_t, kPhaseNames.size()> flops{};
+  Traffic traffic;  // of the updates, not of copying the state
+};
+
 // Alternates: an update of training, then the same actions replayed by a second collector from the
 // same state.
-ordered_json measure(const Options& options, Trainer& trainer) {
-  const std::string& environment = trainer.task().environment;
+Measured alternate(const Options& options, Trainer& trainer) {
   Communicator& communicator = trainer.team().communicator();
   ThreadPool replay_pool(options.threads);
-  Collector replayed(environment, trainer.task().settings.run.lanes, trainer.task().seed,
-                     Team(replay_pool, communicator));
-  Traffic traffic;  // of the updates, not of copying the state or of what follows here
+  Collector replayed(trainer.task().environment, trainer.task().settings.run.lanes,
+                     trainer.task().seed, Team(replay_pool, communicator));
   constexpr int kWarmUp = 3;
-  double training = 0, stepping = 0;
-  std::array<double, static_cast<std::size_t>(Phase::kCount)> before{};
-  std::array<std::int64_t, static_cast<std::size_t>(Phase::kCount)> flops_before{};
+  Measured sums;
+  Stopwatch before = trainer.stopwatch();
   for (int i = 0; i < kWarmUp + options.updates; ++i) {
     if (i == kWarmUp) {
-      traffic = {};
-      training = stepping = 0;
-      for (std::size_t p = 0; p < before.size(); ++p) {
-        before[p] = trainer.stopwatch().seconds(static_cast<Phase>(p));
-        flops_before[p] = trainer.stopwatch().flops(static_cast<Phase>(p));
-      }
+      sums = {};
+      before = trainer.stopwatch();
     }
     TensorStore state;
     Archive saving(state, Archive::Mode::kSave);
@@ -90,61 +91,67 @@ ordered_json measure(const Options& options, Trainer& trainer) {
     Archive loading(state, Archive::Mode::kLoad);
     replayed.archive(loading);
 
-    const Traffic before_update = communicator.traffic();
+    const Traffic traffic = communicator.traffic();
     Clock::time_point start = Clock::now();
     trainer.update();
-    training += seconds_since(start);
-    traffic.messages += communicator.traffic().messages - before_update.messages;
-    traffic.bytes += communicator.traffic().bytes - before_update.bytes;
-    traffic.seconds += communicator.traffic().seconds - before_update.seconds;
+    sums.training += seconds_since(start);
+    sums.traffic += communicator.traffic() - traffic;
     start = Clock::now();
     replayed.replay(trainer.batch());
     largest(communicator, 0);  // the slowest rank's time counts
-    stepping += seconds_since(start);
+    sums.stepping += seconds_since(start);
   }
-  const double samples =
-      static_cast<double>(options.updates) * static_cast<double>(trainer.batch().size());
-  const auto microseconds = [&](double seconds) { return 1e6 * seconds / samples; };
-  ordered_json split, gflops;
-  // Time between updates (copying the state) is no part of training: the rest is what the phases
-  // leave of it.
-  double named = 0;
-  for (std::size_t p = 0; p + 1 < before.size(); ++p) {
-    const double spent = trainer.stopwatch().seconds(static_cast<Phase>(p)) - before[p];
-    named += spent;
-    split[kPhaseNames[p]] = microseconds(spent);
-    const std::int64_t flops = trainer.stopwatch().flops(static_cast<Phase>(p)) - flops_before[p];
-    if (flops > 0 && spent > 0) gflops[kPhaseNames[p]] = 1e-9 * static_cast<double>(flops) / spent;
+  for (std::size_t p = 0; p < kPhaseNames.size(); ++p) {
+    const auto phase = static_cast<Phase>(p);
+    sums.seconds[p] = trainer.stopwatch().seconds(phase) - before.seconds(phase);
+    sums.flops[p] = trainer.stopwatch().flops(phase) - before.flops(phase);
   }
-  split["rest"] = microseconds(training - named);
-  const SavedPolicy policy = trainer.policy();
+  return sums;
+}
+
+std::string signature_of(const SavedPolicy& policy) {
   const auto* theta = reinterpret_cast<const std::uint8_t*>(policy.theta().data());
   const std::span bytes(theta, static_cast<std::size_t>(policy.theta().size()) * sizeof(float));
-  char signature[16];
-  std::snprintf(signature, sizeof signature, "%08x", crc32c(bytes));
-  ordered_json result = {{"environment", environment},
+  char text[16];
+  std::snprintf(text, sizeof text, "%08x", crc32c(bytes));
+  return text;
+}
+
+ordered_json measure(const Options& options, Trainer& trainer) {
+  Communicator& communicator = trainer.team().communicator();
+  const Measured sums = alternate(options, trainer);
+  const auto updates = static_cast<double>(options.updates);
+  const double samples = updates * static_cast<double>(trainer.batch().size());
+  const auto microseconds = [&](double seconds) { return 1e6 * seconds / samples; };
+  ordered_json split, gflops;
+  for (std::size_t p = 0; p < kPhaseNames.size(); ++p) {
+    split[kPhaseNames[p]] = microseconds(sums.seconds[p]);
+    if (sums.flops[p] > 0)
+      gflops[kPhaseNames[p]] = 1e-9 * static_cast<double>(sums.flops[p]) / sums.seconds[p];
+  }
+  const SavedPolicy policy = trainer.policy();
+  ordered_json result = {{"environment", trainer.task().environment},
                          {"method", options.method},
                          {"preset", options.preset},
                          {"samples", samples},
                          {"threads", options.threads},
-                         {"stepping_us", microseconds(stepping)},
-                         {"training_us", microseconds(training)},
-                         {"ratio", training / stepping},
+                         {"stepping_us", microseconds(sums.stepping)},
+                         {"training_us", microseconds(sums.training)},
+                         {"ratio", sums.training / sums.stepping},
                          {"split_us", split},
                          {"gflops", gflops},
                          {"peak_gflops", 1e-9 * peak_flops_per_second()},
                          {"peak_memory_bytes", peak_memory_bytes()},
-                         {"signature", signature}};
+                         {"signature", signature_of(policy)}};
   if (trainer.demonstrations())
     result["demonstration_transitions"] = trainer.demonstrations()->transitions;
   if (communicator.ranks() == 1) return result;
-  const Traffic total = total_of(communicator, traffic);
-  const auto updates = static_cast<double>(options.updates);
+  const Traffic total = total_of(communicator, sums.traffic);
   result["ranks"] = communicator.ranks();
   result["parameters"] = policy.theta().size();
   result["traffic_an_update"] = {{"messages", static_cast<double>(total.messages) / updates},
                                  {"bytes", static_cast<double>(total.bytes) / updates},
-                                 {"seconds_of_rank_0", traffic.seconds / updates}};
+                                 {"seconds_of_rank_0", sums.traffic.seconds / updates}};
   return result;
 }
 

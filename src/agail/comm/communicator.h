@@ -18,6 +18,16 @@ struct Traffic {
   std::int64_t messages = 0;
   std::int64_t bytes = 0;
   double seconds = 0;
+
+  Traffic& operator+=(const Traffic& other) {
+    messages += other.messages;
+    bytes += other.bytes;
+    seconds += other.seconds;
+    return *this;
+  }
+  friend Traffic operator-(const Traffic& a, const Traffic& b) {
+    return {a.messages - b.messages, a.bytes - b.bytes, a.seconds - b.seconds};
+  }
 };
 
 // Messages between two ranks arrive in the order in which they were sent. Called by one thread a
