@@ -227,10 +227,13 @@ def timed(command: list[str]) -> dict:
     return {"seconds": seconds, "peak_memory_mb": usage.ru_maxrss * 1024 / 1e6}
 
 
-def exponent(rows: list[dict], quantity: str) -> float:
-    """Of the power of `size` that the quantity of the two largest sizes follows."""
+def power(rows: list[dict], of: str) -> str:
+    """How learning grows with `size` between the two largest sizes."""
     a, b = sorted(rows, key=lambda row: row["size"])[-2:]
-    return math.log(b[quantity] / a[quantity]) / math.log(b["size"] / a["size"])
+    if min(a["learning_us"], b["learning_us"]) <= 0:
+        return "Learning is too little to be told from the noise of this machine."
+    exponent = math.log(b["learning_us"] / a["learning_us"]) / math.log(b["size"] / a["size"])
+    return f"At the end, learning a sample goes with the {exponent:.2f}th power of {of}."
 
 
 def table(rows: list[dict], columns: dict[str, str], digits: int = 2) -> str:
@@ -248,22 +251,28 @@ def text_of(part: str, rows: list[dict]) -> str:
     learning = {"learning_us": "learning, us a sample"}
     guide = {"guide_us": "guide, us a sample", "peak_memory_mb": "peak memory, MB"}
     if part == "batch":
-        grows = f"Learning a sample goes with the {exponent(rows, 'learning_us'):.2f}th power of the batch."
+        grows = power(rows, "the batch")
         return f"{table(rows, {'x': 'samples a batch'} | costs | learning)}\n\n{grows}"
     if part == "width":
-        grows = f"Learning goes with the {exponent(rows, 'learning_us'):.2f}th power of the number of weights."
+        grows = power(rows, "the number of weights")
         return f"{table(rows, {'x': 'hidden units', 'size': 'weights of the policy'} | learning)}\n\n{grows}"
     if part == "observations":
         columns = {"variant": "environment", "x": "observations"} | costs | learning
-        grows = f"Learning goes with the {exponent([rows[0], rows[-1]], 'learning_us'):.2f}th power of the size."
+        grows = power([rows[0], rows[-1]], "the number of observations")
         return f"{table(rows, columns)}\n\n{grows}"
     if part == "demonstrations":
         return table(rows, {"variant": "environment, guide.target", "x": "transitions"} | guide)
     if part == "file":
+        before: dict[str, dict] = {}
         for row in rows:
-            row["each"] = 1e6 * row["peak_memory_mb"] / row["x"]
+            last = before.get(row["variant"])
+            row["each"] = ""
+            if last:
+                more = row["peak_memory_mb"] - last["peak_memory_mb"]
+                row["each"] = 1e6 * more / (row["x"] - last["x"])
+            before[row["variant"]] = row
         columns = {"variant": "command", "x": "transitions", "seconds": "seconds"}
-        columns |= {"peak_memory_mb": "peak memory, MB", "each": "bytes a transition"}
+        columns |= {"peak_memory_mb": "peak memory, MB", "each": "bytes a further transition"}
         return table(rows, columns, 1)
     for row in rows:
         row["gain"] = rows[0]["training_us"] / row["training_us"]

@@ -17,7 +17,7 @@ def write_demonstrations(path: Path, transitions: int) -> None:
         return
     partial = path.with_suffix(".partial")
     random = np.random.default_rng(0)
-    with h5py.File(partial, "w", libver="latest") as file:
+    with h5py.File(partial, "w") as file:
         for number in range(transitions // EPISODE):
             group = file.create_group(f"episode_{number}")
             walk = np.cumsum(0.05 * random.standard_normal((EPISODE + 1, OBSERVATIONS)), axis=0)
