@@ -1,8 +1,10 @@
-"""A large file of demonstrations in Minari's layout, written in pieces (needs h5py)."""
+"""A large file of demonstrations in Minari's layout, written in pieces (needs h5py): growth_file.py PATH TRANSITIONS"""
 
 import os
+import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 EPISODE = 1000
@@ -11,8 +13,6 @@ OBSERVATIONS, ACTIONS = 11, 3  # Hopper
 
 def write_demonstrations(path: Path, transitions: int) -> None:
     """Random walks in episodes of 1,000 steps, half of the actions missing, not compressed; whole or absent. What is there is kept."""
-    import h5py
-
     if path.exists():
         return
     partial = path.with_suffix(".partial")
@@ -29,3 +29,7 @@ def write_demonstrations(path: Path, transitions: int) -> None:
             group["terminations"] = np.zeros(EPISODE, bool)
             group["truncations"] = np.arange(EPISODE) == EPISODE - 1
     os.replace(partial, path)  # noqa: PTH105
+
+
+if __name__ == "__main__":
+    write_demonstrations(Path(sys.argv[1]), int(sys.argv[2]))
