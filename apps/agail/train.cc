@@ -16,7 +16,7 @@
 namespace agail {
 namespace {
 
-const std::vector<std::string> kMethods = {"trpo", "gail", "state-gail", "agail", "bc"};
+const std::vector<std::string> kMethods = {"trpo", "gail", "state-gail", "agail", "bc", "bco"};
 
 struct Options {
   std::string environment, method, out, demos;
@@ -44,7 +44,7 @@ SettingsSource source_of(const Options& options, bool preset_given) {
 TrainingTask make_task(const Options& options, bool preset_given, bool first_rank) {
   if (std::find(kMethods.begin(), kMethods.end(), options.method) == kMethods.end())
     throw InputError("--method " + options.method + ": no such method; did you mean '" +
-                     nearest(options.method, kMethods) + "'? (trpo gail state-gail agail bc)");
+                     nearest(options.method, kMethods) + "'? (trpo gail state-gail agail bc bco)");
   environment_spec(options.environment);  // an unknown id is told before anything else
   TrainingTask task;
   task.environment = options.environment;
@@ -87,7 +87,7 @@ void add_train(CLI::App& app, Communicator& communicator) {
   CLI::App* command = app.add_subcommand("train", "Train a policy");
   const auto options = std::make_shared<Options>();
   command->add_option("ENV", options->environment, "Environment id, see agail envs")->required();
-  command->add_option("--method", options->method, "trpo gail state-gail agail bc")->required();
+  command->add_option("--method", options->method, "trpo gail state-gail agail bc bco")->required();
   command->add_option("--out", options->out, "Run folder to create")->required();
   command->add_option(
       "--demos", options->demos,

@@ -25,6 +25,11 @@ TASKS = {  # environment, demonstrations, options
         "hopper-part.hdf5",
         ["--method", "gail", "--set=start.method=clone", "--set=clone.weight=0.1"],
     ),
+    "bco": (
+        "Hopper-v5",
+        "hopper-part.hdf5",
+        ["--method", "bco", "--set=bco.every=2", "--set=bco.epochs=2", "--set=bco.buffer=700"],
+    ),
 }
 
 
@@ -61,7 +66,8 @@ def assert_same_result(run, reference):
     checkpoint = "checkpoints/latest.safetensors"
     assert (run / checkpoint).read_bytes() == (reference / checkpoint).read_bytes()
     assert learned(run) == learned(reference)
-    assert (run / "config.toml").read_bytes() == (reference / "config.toml").read_bytes()
+    for name in ("config.toml", "episodes.csv"):
+        assert (run / name).read_bytes() == (reference / name).read_bytes(), name
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +84,8 @@ def test_contents(imitation, small):
     names = {path.name for path in imitation.iterdir()}
     (events,) = {name for name in names if name.startswith("events.out.tfevents.")}
     assert names - {events} == {
-        "config.toml", "progress.csv", "checkpoints", "policy.safetensors", "summary.json",
+        "config.toml", "progress.csv", "episodes.csv", "checkpoints", "policy.safetensors",
+        "summary.json",
     }  # fmt: skip
     assert (small / "cartpole-expert" / "policy_best.safetensors").exists()
     summary = json.loads((imitation / "summary.json").read_text())

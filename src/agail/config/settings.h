@@ -103,6 +103,13 @@ struct InverseDynamicsSettings {
   double learning_rate = 1e-3;
 };
 
+// Behaviour cloning from observation: rounds of collecting, inverse dynamics and cloning.
+struct BcoSettings {
+  std::int64_t every = 5;        // policy batches a round
+  std::int64_t buffer = 20'000;  // own transitions that inverse dynamics learns from
+  std::int64_t epochs = 20;      // of a round, for inverse dynamics and for cloning each
+};
+
 struct Settings {
   RunSettings run;
   PolicySettings policy;
@@ -115,6 +122,7 @@ struct Settings {
   CloneSettings clone;
   BcSettings bc;
   InverseDynamicsSettings inverse_dynamics;
+  BcoSettings bco;
 };
 
 }  // namespace agail

@@ -89,6 +89,10 @@ std::span<const Setting> settings_table() {
     {AGAIL_SETTING(inverse_dynamics.hidden), at_least(1), "units", "hidden layers of the inverse dynamics network (tanh)"},
     {AGAIL_SETTING(inverse_dynamics.epochs), at_least(1), "", "passes over the data"},
     {AGAIL_SETTING(inverse_dynamics.learning_rate), above(0), "", "step size of Adam"},
+
+    {AGAIL_SETTING(bco.every), at_least(1), "policy batches", "batches collected before inverse dynamics and the policy are fitted again"},
+    {AGAIL_SETTING(bco.buffer), at_least(1), "transitions", "latest own transitions that inverse dynamics learns from"},
+    {AGAIL_SETTING(bco.epochs), at_least(1), "", "largest number of passes over the data in one fit, of inverse dynamics and of the policy each"},
   };
   // clang-format on
   return table;

@@ -118,7 +118,8 @@ RegressionReport fit_actions(const PolicyNetwork<float>& network, Vector<float>&
                              const RegressionSettings& settings, ThreadPool& pool,
                              std::uint64_t seed, Purpose purpose) {
   AGAIL_CHECK(!columns.empty());
-  RandomStream split(seed, Purpose::kHoldout, static_cast<std::uint32_t>(purpose));
+  RandomStream split(seed, Purpose::kHoldout, static_cast<std::uint32_t>(purpose), 0,
+                     settings.round);
   shuffle(columns, split);
   const auto n = static_cast<Index>(columns.size());
   const auto held = static_cast<Index>(settings.validation_share * static_cast<double>(n));
@@ -135,7 +136,7 @@ RegressionReport fit_actions(const PolicyNetwork<float>& network, Vector<float>&
   report.validation_loss = std::numeric_limits<double>::infinity();
 
   for (std::int64_t epoch = 1; epoch <= settings.epochs && interrupted() == 0; ++epoch) {
-    RandomStream order(seed, purpose, 0, static_cast<std::uint32_t>(epoch));
+    RandomStream order(seed, purpose, 0, static_cast<std::uint32_t>(epoch), settings.round);
     shuffle(training, order);
     const double rate = settings.learning_rate *
                         (1 - static_cast<double>(epoch - 1) / static_cast<double>(settings.epochs));

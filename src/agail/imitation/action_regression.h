@@ -22,6 +22,7 @@ struct RegressionSettings {
   double learning_rate = 1e-3;
   std::int64_t minibatch = 128;
   double validation_share = 0.1;
+  std::uint32_t round = 0;  // names the random numbers of a fit that goes on from an earlier one
 };
 
 // Fits theta's network part in place with Adam whose rate falls linearly to zero; keeps the

@@ -7,13 +7,14 @@ namespace agail {
 RegressionReport clone_policy(const PolicyNetwork<float>& network, const Normalizer& normalizer,
                               const DemoData& demos, const CloningTargets& targets,
                               const BcSettings& settings, bool fit_log_std, ThreadPool& pool,
-                              std::uint64_t seed, Vector<float>& theta) {
+                              std::uint64_t seed, Vector<float>& theta, std::uint32_t round) {
   Matrix<float> x = Matrix<float>::Zero(padded(network.mlp.inputs() + 1), demos.size());
   normalizer.apply(pool, demos.states, demos.size(), x);
   const RegressionSettings regression{.epochs = settings.epochs,
                                       .learning_rate = settings.learning_rate,
                                       .minibatch = settings.minibatch,
-                                      .validation_share = settings.validation_share};
+                                      .validation_share = settings.validation_share,
+                                      .round = round};
   const RegressionReport report =
       fit_actions(network, theta, x, targets.actions, targets.available, targets.columns,
                   regression, pool, seed, Purpose::kClone);

@@ -18,11 +18,11 @@ struct CloningTargets {
 
 // Fits theta's network part; the normaliser (of the demonstrated states) is given. Where
 // `fit_log_std` is set, log_std becomes that of the residuals (the maximum-likelihood value, at
-// least -3).
+// least -3). `round` numbers fits that go on from each other.
 RegressionReport clone_policy(const PolicyNetwork<float>& network, const Normalizer& normalizer,
                               const DemoData& demos, const CloningTargets& targets,
                               const BcSettings& settings, bool fit_log_std, ThreadPool& pool,
-                              std::uint64_t seed, Vector<float>& theta);
+                              std::uint64_t seed, Vector<float>& theta, std::uint32_t round = 0);
 
 // weight_k * mean_j log pi(a_j | s_j) over demonstrated pairs, weight_k = weight * decay^k at
 // update k.

@@ -32,6 +32,13 @@ DemoData::DemoData(const Demonstrations& demos) {
   }
 }
 
+Matrix<float> DemoData::next_states() const {
+  Matrix<float> all(states.rows(), size());
+  for (Index j = 0; j < size(); ++j)
+    all.col(j) = Eigen::Map<const Vector<float>>(next_state(j), states.rows());
+  return all;
+}
+
 std::uint64_t DemoData::memory(const Demonstrations& demos) {
   const auto n = static_cast<std::uint64_t>(demos.transitions());
   const auto numbers = static_cast<std::uint64_t>(demos.observation_dim + 2 * demos.action.dim);

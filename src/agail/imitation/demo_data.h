@@ -22,6 +22,8 @@ struct DemoData {
     return end < 0 ? states.col(column + 1).data() : final_states.col(end).data();
   }
 
+  Matrix<float> next_states() const;  // observation_dim x n, a copy
+
   // Bytes that demonstrations of this size will take here.
   static std::uint64_t memory(const Demonstrations& demos);
 

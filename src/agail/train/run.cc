@@ -154,7 +154,6 @@ class Run {
   std::optional<RunLog> log_;  // of the first rank
   RunOutcome outcome_;
   double best_return_ = -std::numeric_limits<double>::max();
-  bool resumed_ = false;
   std::int64_t saved_timesteps_ = -1;
 };
 
@@ -174,13 +173,17 @@ bool Run::prepare() {
     remove_unfinished_files(folder_);
     remove_unfinished_files(folder_ / "checkpoints");
   });
-  resumed_ = resume_ && checkpoint_->load(*trainer_, best_return_);
+  // Before a checkpoint replaces the start: a resumed run knows how good it was, too.
+  if (trainer_->cloning() && trainer_->learns_by_interaction() && settings_.evaluate_every > 0)
+    outcome_.cloned = evaluate(trainer_->policy(), settings_.evaluation_episodes,
+                               trainer_->task().seed, false, trainer_->team());
+  const bool resumed = resume_ && checkpoint_->load(*trainer_, best_return_);
   together(communicator_, [&] {
     if (!first_) return;
     tell_start(*trainer_);
     write_file_atomically(folder_ / "config.toml", trainer_->task().settings_toml);
     log_.emplace(folder_, settings_.timesteps,
-                 resumed_ ? std::optional(trainer_->timesteps()) : std::nullopt);
+                 resumed ? std::optional(trainer_->timesteps()) : std::nullopt);
   });
   return true;
 }
@@ -206,10 +209,6 @@ void Run::save() {
 
 void Run::train() {
   Trainer& trainer = *trainer_;
-  if (trainer.cloning() && trainer.learns_by_interaction() && !resumed_ &&
-      settings_.evaluate_every > 0)
-    outcome_.cloned = evaluate_now();
-
   // An interrupt waits for the update and its evaluation: a second or so.
   while (!trainer.finished() && !interrupted_anywhere()) {
     const UpdateReport report = trainer.update();
@@ -217,7 +216,7 @@ void Run::train() {
     if (settings_.evaluate_every > 0 &&
         (report.update % settings_.evaluate_every == 0 || trainer.finished()))
       evaluation = evaluate_now();
-    if (first_) log_->update(report, trainer.stopwatch(), evaluation);
+    if (first_) log_->update(report, trainer.batch().finished, trainer.stopwatch(), evaluation);
     if (report.update % settings_.checkpoint_every == 0 || trainer.finished()) save();
   }
   if (trainer.learns_by_interaction() && saved_timesteps_ != trainer.timesteps()) save();

@@ -1,5 +1,5 @@
-// A training run and its folder: config.toml, progress.csv, event files, checkpoints/, policies,
-// summary.json.
+// A training run and its folder: config.toml, progress.csv, episodes.csv, event files,
+// checkpoints/, policies, summary.json.
 #pragma once
 
 #include <filesystem>

@@ -71,7 +71,8 @@ const std::vector<Column>& columns() {
        }},
       {"train/std",
        [](const Row& r) { return r.report.mean_std > 0 ? r.report.mean_std : kAbsent; }},
-      {"train/explained_variance", [](const Row& r) { return r.report.explained_variance; }},
+      {"train/explained_variance",
+       [](const Row& r) { return r.report.explained_variance.value_or(kAbsent); }},
       {"discriminator/loss",
        [](const Row& r) { return r.discriminator(&DiscriminatorReport::loss); }},
       {"discriminator/policy_accuracy",
@@ -97,6 +98,12 @@ const std::vector<Column>& columns() {
        }},
       {"clone/log_likelihood",
        [](const Row& r) { return r.report.clone_log_likelihood.value_or(kAbsent); }},
+      {"clone/quality",
+       [](const Row& r) { return r.report.bco ? r.report.bco->cloning.quality : kAbsent; }},
+      {"inverse_dynamics/quality",
+       [](const Row& r) {
+         return r.report.bco ? r.report.bco->inverse_dynamics.quality : kAbsent;
+       }},
   };
   return table;
 }
@@ -109,18 +116,22 @@ std::vector<std::string> progress_columns() {
   return names;
 }
 
+std::vector<std::string> episode_columns() { return {"timesteps", "length", "return"}; }
+
 RunLog::RunLog(const std::filesystem::path& folder, std::int64_t total_timesteps,
                std::optional<std::int64_t> resume_step)
     : total_timesteps_(total_timesteps),
       first_timesteps_(resume_step.value_or(0)),
       terminal_(isatty(STDERR_FILENO) == 1),
       csv_(folder / "progress.csv", progress_columns()),
+      episodes_(folder / "episodes.csv", episode_columns()),
       events_(folder, resume_step) {
   csv_.truncate_after("time/total_timesteps", static_cast<double>(first_timesteps_));
+  episodes_.truncate_after("timesteps", static_cast<double>(first_timesteps_));
 }
 
-void RunLog::update(const UpdateReport& report, const Stopwatch& stopwatch,
-                    const std::optional<Evaluation>& evaluation) {
+void RunLog::update(const UpdateReport& report, std::span<const FinishedEpisode> finished,
+                    const Stopwatch& stopwatch, const std::optional<Evaluation>& evaluation) {
   const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
   const double steps_per_second =
       static_cast<double>(report.timesteps - first_timesteps_) / std::max(elapsed, 1e-9);
@@ -133,6 +144,12 @@ void RunLog::update(const UpdateReport& report, const Stopwatch& stopwatch,
     scalars.emplace_back(column.name, values.back());
   }
   csv_.row(values);
+  std::vector<double> episodes;
+  for (const FinishedEpisode& episode : finished)
+    for (const double value :
+         {static_cast<double>(report.timesteps), episode.length, episode.episode_return})
+      episodes.push_back(value);
+  episodes_.rows(episodes);
   events_.scalars(report.timesteps, scalars);
 
   // A bar moves ten times a second; lines come every ten seconds.

@@ -1,15 +1,16 @@
-// What a run tells while it goes on: progress.csv, TensorBoard events, and a line or a bar on
-// stderr.
+// What a run tells while it goes on: progress.csv, episodes.csv, TensorBoard events, and a line or
+// a bar on stderr.
 #pragma once
 
 #include <chrono>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "agail/train/csv_log.h"
 #include "agail/train/evaluation.h"
-#include "agail/train/progress_csv.h"
 #include "agail/train/tensorboard.h"
 #include "agail/train/trainer.h"
 
@@ -18,6 +19,10 @@ namespace agail {
 // Names as stable-baselines3 has them where it has the quantity.
 std::vector<std::string> progress_columns();
 
+// episodes.csv, a row a finished training episode: timesteps at the end of its update, its length
+// and its return. Several lanes follow each other within an update.
+std::vector<std::string> episode_columns();
+
 class RunLog {
  public:
   // Files in `folder`. After a resume `resume_step` is the checkpoint's number of timesteps: what
@@ -25,8 +30,9 @@ class RunLog {
   RunLog(const std::filesystem::path& folder, std::int64_t total_timesteps,
          std::optional<std::int64_t> resume_step);
 
-  void update(const UpdateReport& report, const Stopwatch& stopwatch,
-              const std::optional<Evaluation>& evaluation);
+  // `finished`: the training episodes that ended in this update's batch.
+  void update(const UpdateReport& report, std::span<const FinishedEpisode> finished,
+              const Stopwatch& stopwatch, const std::optional<Evaluation>& evaluation);
   // Hands everything to the operating system.
   void flush() { events_.flush(); }
   // Ends the bar, if there is one.
@@ -42,7 +48,8 @@ class RunLog {
   Clock::time_point shown_;
   bool bar_open_ = false;
   std::optional<double> evaluated_return_;
-  ProgressCsv csv_;
+  CsvLog csv_;
+  CsvLog episodes_;
   TensorBoardWriter events_;
 };
 

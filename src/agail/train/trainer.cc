@@ -88,6 +88,13 @@ void Trainer::start() {
   demos_ = std::make_unique<DemoData>(*task_.demonstrations);
   task_.demonstrations.reset();  // with many of them, half of the memory
   const double missing = demonstrations_->missing_ratio;
+  if (task_.method == "bco") {
+    normalizer_frozen_ = true;
+    normalizer_.update(pool_, demos_->states);
+    bco_ = std::make_unique<BehaviorCloningFromObservation>(
+        network_, normalizer_, *demos_, spec_.action, settings, pool_, task_.seed);
+    return;
+  }
   const bool adversarial = task_.method != "bc";
   if (adversarial)
     reward_ = std::make_unique<AdversarialReward>(task_.method, *demos_, spec_.action, missing,
@@ -97,8 +104,8 @@ void Trainer::start() {
   const bool has_actions = !demos_->some_action.empty() && task_.method != "state-gail";
   if (!adversarial && !has_actions)
     throw InputError(
-        "method bc learns from actions, but the demonstrations have none; use --method agail or "
-        "state-gail");
+        "method bc learns from actions, but the demonstrations have none; use --method bco, agail "
+        "or state-gail");
   const bool clones = !adversarial || (has_actions && settings.start.method != "random");
   normalizer_frozen_ = clones || settings.policy.freeze_normalizer;
   if (normalizer_frozen_) normalizer_.update(pool_, demos_->states);
@@ -127,24 +134,11 @@ void Trainer::start() {
         network_, normalizer_, *demos_, std::move(targets), settings.clone, pool_, task_.seed);
 }
 
-UpdateReport Trainer::update() {
+// From the rewards of the batch: one step of the policy, and the value network's fit.
+void Trainer::learn(UpdateReport& report) {
   const Settings& settings = task_.settings;
   const Index n = batch_.size();
   const auto number = static_cast<std::uint32_t>(updates_);
-  UpdateReport report;
-  stopwatch_.begin_update();
-
-  // Roll out the policy.
-  collector_.collect(network_, theta_, normalizer_, batch_, stopwatch_);
-  timesteps_ += n;
-  for (const FinishedEpisode& episode : batch_.finished) {
-    const auto slot = static_cast<std::size_t>(episodes_++) % kRecentEpisodes;
-    recent_returns_.resize(std::max(recent_returns_.size(), slot + 1));
-    recent_lengths_.resize(recent_returns_.size());
-    recent_returns_[slot] = episode.episode_return;
-    recent_lengths_[slot] = episode.length;
-  }
-  diverged_ += batch_.diverged;
 
   // Rewards: the environment's, or those of discriminator and guide, which learn first.
   double terminal_value = 0;
@@ -172,6 +166,30 @@ UpdateReport Trainer::update() {
   stopwatch_.start(Phase::kValue);
   value_.fit(batch_.inputs, advantage_.targets(), n, number);
   stopwatch_.start(Phase::kRest);
+}
+
+UpdateReport Trainer::update() {
+  const Index n = batch_.size();
+  const auto number = static_cast<std::uint32_t>(updates_);
+  UpdateReport report;
+  stopwatch_.begin_update();
+
+  // Roll out the policy.
+  collector_.collect(network_, theta_, normalizer_, batch_, stopwatch_);
+  timesteps_ += n;
+  for (const FinishedEpisode& episode : batch_.finished) {
+    const auto slot = static_cast<std::size_t>(episodes_++) % kRecentEpisodes;
+    recent_returns_.resize(std::max(recent_returns_.size(), slot + 1));
+    recent_lengths_.resize(recent_returns_.size());
+    recent_returns_[slot] = episode.episode_return;
+    recent_lengths_[slot] = episode.length;
+  }
+  diverged_ += batch_.diverged;
+
+  if (bco_)
+    report.bco = bco_->update(batch_, number, theta_);
+  else
+    learn(report);
 
   if (!normalizer_frozen_) normalizer_.update(pool_, batch_.observations);
   ++updates_;
@@ -213,6 +231,7 @@ void Trainer::archive(Archive& a) {
   a.scope("value", [&](Archive& inner) { value_.archive(inner); });
   a.scope("lane", [&](Archive& inner) { collector_.archive(inner); });
   if (reward_) a.scope("reward", [&](Archive& inner) { reward_->archive(inner); });
+  if (bco_) a.scope("bco", [&](Archive& inner) { bco_->archive(inner); });
   if (cloning_term_)
     a.scope("cloning_term", [&](Archive& inner) { cloning_term_->archive(inner); });
 }

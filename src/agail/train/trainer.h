@@ -1,5 +1,6 @@
 // The one training loop. Methods differ in where the reward comes from (environment | discriminator
-// | discriminator and guide), in how the policy starts, and in a cloning term of its objective.
+// | discriminator and guide), in how the policy starts, and in a cloning term of its objective; bco
+// clones instead of taking policy steps.
 #pragma once
 
 #include <memory>
@@ -9,6 +10,7 @@
 #include "agail/base/stopwatch.h"
 #include "agail/demos/demonstrations_summary.h"
 #include "agail/imitation/agail.h"
+#include "agail/imitation/bco.h"
 #include "agail/imitation/behavior_cloning.h"
 #include "agail/imitation/inverse_dynamics.h"
 #include "agail/rl/advantage.h"
@@ -19,7 +21,7 @@ namespace agail {
 
 struct TrainingTask {
   std::string environment;
-  std::string method;  // trpo gail state-gail agail bc
+  std::string method;  // trpo gail state-gail agail bc bco
   Settings settings;
   std::string settings_toml;
   std::uint64_t seed = 0;
@@ -34,13 +36,14 @@ struct UpdateReport {
   double episode_return =
       0;  // mean over the last 100 finished training episodes; NaN before the first
   double episode_length = 0;
-  std::int64_t episodes = 0;       // finished so far
-  std::int64_t diverged = 0;       // of these, ended by a broken simulation
-  std::optional<TrpoReport> trpo;  // absent while only the value network learns
-  double explained_variance = 0;
-  double mean_std = 0;  // of continuous actions
+  std::int64_t episodes = 0;                 // finished so far
+  std::int64_t diverged = 0;                 // of these, ended by a broken simulation
+  std::optional<TrpoReport> trpo;            // absent while only the value network learns
+  std::optional<double> explained_variance;  // absent without a value network
+  double mean_std = 0;                       // of continuous actions
   std::optional<ImitationReport> imitation;
   std::optional<double> clone_log_likelihood;
+  std::optional<BcoReport> bco;  // at the end of a round
 };
 
 class Trainer {
@@ -81,6 +84,7 @@ class Trainer {
  private:
   void check();
   void start();
+  void learn(UpdateReport& report);
 
   TrainingTask task_;
   EnvironmentSpec spec_;
@@ -99,6 +103,7 @@ class Trainer {
   Trpo trpo_;
   std::unique_ptr<AdversarialReward> reward_;
   std::unique_ptr<CloningTerm> cloning_term_;
+  std::unique_ptr<BehaviorCloningFromObservation> bco_;
   std::optional<RegressionReport> cloning_, inverse_dynamics_;
   Vector<float> rewards_;
   Stopwatch stopwatch_;

@@ -1,4 +1,4 @@
-#include "agail/train/progress_csv.h"
+#include "agail/train/csv_log.h"
 
 #include <array>
 #include <cmath>
@@ -21,10 +21,10 @@ std::string text(const std::filesystem::path& path) {
 
 const std::vector<std::string> kColumns = {"time/total_timesteps", "rollout/ep_rew_mean"};
 
-TEST(ProgressCsv, ShortestNumbersAndEmptyCells) {
+TEST(CsvLog, ShortestNumbersAndEmptyCells) {
   const TemporaryFolder folder;
   const auto path = folder / "progress.csv";
-  ProgressCsv csv(path, kColumns);
+  CsvLog csv(path, kColumns);
   csv.row(std::array{1000000.0, 0.1});
   csv.row(std::array{2000000.0, kNone});
   csv.row(std::array{-0.0, 1.0 / 3});
@@ -34,24 +34,24 @@ TEST(ProgressCsv, ShortestNumbersAndEmptyCells) {
             "1000000,0.1\n2000000,\n0,0.3333333333333333\n1e+300,-inf\n");
 }
 
-TEST(ProgressCsv, GoesOnAndRefusesOtherColumns) {
+TEST(CsvLog, GoesOnAndRefusesOtherColumns) {
   const TemporaryFolder folder;
   const auto path = folder / "progress.csv";
-  ProgressCsv(path, kColumns).row(std::array{1.0, 2.0});
-  ProgressCsv(path, kColumns).row(std::array{3.0, 4.0});
+  CsvLog(path, kColumns).row(std::array{1.0, 2.0});
+  CsvLog(path, kColumns).row(std::array{3.0, 4.0});
   EXPECT_EQ(text(path), "time/total_timesteps,rollout/ep_rew_mean\n1,2\n3,4\n");
-  EXPECT_THAT(input_error([&] { ProgressCsv(path, {"other"}); }), HasSubstr("its columns are not"));
+  EXPECT_THAT(input_error([&] { CsvLog(path, {"other"}); }), HasSubstr("its columns are not"));
   write_file_atomically(path, "time/total_times");  // the header was cut short
-  ProgressCsv(path, kColumns).row(std::array{1.0, 2.0});
+  CsvLog(path, kColumns).row(std::array{1.0, 2.0});
   EXPECT_EQ(text(path), "time/total_timesteps,rollout/ep_rew_mean\n1,2\n");
 }
 
-TEST(ProgressCsv, TruncatesToTheCheckpoint) {
+TEST(CsvLog, TruncatesToTheCheckpoint) {
   const TemporaryFolder folder;
   const auto path = folder / "progress.csv";
   const std::string header = "time/total_timesteps,rollout/ep_rew_mean\n";
   write_file_atomically(path, header + "1024,1\n2048,\n3072,3\n40");
-  ProgressCsv csv(path, kColumns);
+  CsvLog csv(path, kColumns);
   csv.truncate_after("time/total_timesteps", 2048);
   EXPECT_EQ(text(path), header + "1024,1\n2048,\n");
   csv.row(std::array{3072.0, 5.0});

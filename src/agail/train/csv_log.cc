@@ -1,9 +1,10 @@
-#include "agail/train/progress_csv.h"
+#include "agail/train/csv_log.h"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -49,7 +50,7 @@ std::string read_text(const fs::path& path) {
 
 }  // namespace
 
-ProgressCsv::ProgressCsv(fs::path path, std::vector<std::string> columns)
+CsvLog::CsvLog(fs::path path, std::vector<std::string> columns)
     : path_(std::move(path)), columns_(std::move(columns)) {
   for (const std::string& column : columns_)
     AGAIL_CHECK(column.find_first_of(",\"\n") == std::string::npos);
@@ -63,24 +64,35 @@ ProgressCsv::ProgressCsv(fs::path path, std::vector<std::string> columns)
   open();
 }
 
-void ProgressCsv::open() {
+void CsvLog::open() {
   file_.open(path_, std::ios::binary | std::ios::app);
   if (!file_) throw SystemError("cannot write " + path_.string());
 }
 
-void ProgressCsv::row(std::span<const double> values) {
+void CsvLog::row(std::span<const double> values) {
   AGAIL_CHECK(values.size() == columns_.size());
-  std::vector<std::string> cells;
-  for (const double value : values) cells.push_back(cell(value));
-  put(joined(cells));
+  rows(values);
 }
 
-void ProgressCsv::put(const std::string& line) {
-  file_ << line << std::flush;
+void CsvLog::rows(std::span<const double> values) {
+  AGAIL_CHECK(values.size() % columns_.size() == 0);
+  std::string text;
+  std::vector<std::string> cells;
+  for (const double value : values) {
+    cells.push_back(cell(value));
+    if (cells.size() < columns_.size()) continue;
+    text += joined(cells);
+    cells.clear();
+  }
+  if (!text.empty()) put(text);
+}
+
+void CsvLog::put(const std::string& text) {
+  file_ << text << std::flush;
   if (!file_) throw SystemError("cannot write " + path_.string() + "; is the disk full?");
 }
 
-void ProgressCsv::truncate_after(std::string_view column, double value) {
+void CsvLog::truncate_after(std::string_view column, double value) {
   const auto found = std::find(columns_.begin(), columns_.end(), column);
   AGAIL_CHECK(found != columns_.end());
   const auto index = static_cast<std::size_t>(found - columns_.begin());
@@ -103,6 +115,37 @@ void ProgressCsv::truncate_after(std::string_view column, double value) {
   }
   if (kept != text) write_file_atomically(path_, kept);
   open();
+}
+
+std::vector<std::pair<double, double>> read_columns(const fs::path& path, std::string_view first,
+                                                    std::string_view second) {
+  const std::string text = read_text(path);
+  std::string_view rest = text;
+  const auto next_line = [&] {
+    const std::size_t end = rest.find('\n');
+    if (end == std::string_view::npos) return std::vector<std::string_view>();
+    const std::string_view line = rest.substr(0, end);
+    rest.remove_prefix(end + 1);
+    return split(line);
+  };
+  const std::vector<std::string_view> names = next_line();
+  const auto index = [&](std::string_view name) {
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+      throw InputError(path.string() + ": no column '" + std::string(name) +
+                       "'; give a run of this version");
+    return static_cast<std::size_t>(found - names.begin());
+  };
+  const std::size_t a = index(first), b = index(second);
+  const auto number = [](std::string_view digits) {
+    double value = std::numeric_limits<double>::quiet_NaN();
+    std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    return value;
+  };
+  std::vector<std::pair<double, double>> rows;
+  for (auto cells = next_line(); cells.size() == names.size(); cells = next_line())
+    rows.emplace_back(number(cells[a]), number(cells[b]));
+  return rows;
 }
 
 }  // namespace agail
