@@ -22,5 +22,6 @@ void add_inspect(CLI::App& app);
 void add_eval(CLI::App& app);
 void add_bench(CLI::App& app, Communicator& communicator);
 void add_convert(CLI::App& app);
+void add_reproduce(CLI::App& app);
 
 }  // namespace agail

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <string_view>
 
 #include "agail/base/build_info.h"
 #include "agail/base/error.h"
@@ -38,6 +39,7 @@ int run(int argc, char** argv, agail::Communicator& communicator) {
   agail::add_inspect(app);
   agail::add_eval(app);
   agail::add_bench(app, communicator);
+  agail::add_reproduce(app);
 
   if (argc > 1 && argv[1][0] != '-') {
     std::vector<std::string> names;
@@ -92,7 +94,12 @@ int run_and_flush(int argc, char** argv, agail::Communicator& communicator) {
 int main(int argc, char** argv) {
   std::unique_ptr<agail::Communicator> communicator;
   try {
-    communicator = agail::join_ranks();
+    // The processes of `reproduce` share work through files; a launcher may start them, too.
+    const bool alone = argc > 1 && std::string_view(argv[1]) == "reproduce";
+    if (alone)
+      communicator = std::make_unique<agail::SerialCommunicator>();
+    else
+      communicator = agail::join_ranks();
   } catch (const agail::InputError& e) {
     if (agail::is_first_rank()) std::fprintf(stderr, "agail: %s\n", e.what());
     return 2;

@@ -6,7 +6,9 @@ import os
 import pytest
 from conftest import SMALL
 
-COMMANDS = ["envs", "train", "record", "mask", "convert", "inspect", "eval", "bench"]
+COMMANDS = [
+    "envs", "train", "record", "mask", "convert", "inspect", "eval", "bench", "reproduce",
+]  # fmt: skip
 
 
 def test_help_everywhere(agail):

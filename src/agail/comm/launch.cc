@@ -1,8 +1,13 @@
 #include "agail/comm/launch.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <initializer_list>
+#include <string>
+#include <vector>
 
 #include "agail/base/error.h"
 #include "agail/comm/mpi/mpi_communicator.h"
@@ -31,6 +36,21 @@ int ranks_on_this_machine() {
   if (launched_rank() < 0) return 1;
   return std::max(
       1, number_of({"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_TASKS_PER_NODE"}));
+}
+
+std::optional<LaunchedProcess> launched_process() {
+  if (launched_rank() < 0) return std::nullopt;
+  return LaunchedProcess{launched_rank(), std::max(launched_ranks(), launched_rank() + 1)};
+}
+
+void forget_launcher() {
+  std::vector<std::string> names;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string name = std::string(*variable).substr(0, std::strcspn(*variable, "="));
+    for (const char* prefix : {"OMPI_", "PMIX_", "PMI_", "SLURM_STEP"})
+      if (name.starts_with(prefix)) names.push_back(name);
+  }
+  for (const std::string& name : names) unsetenv(name.c_str());
 }
 
 bool is_first_rank() { return launched_rank() <= 0; }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "agail/comm/communicator.h"
 
@@ -10,6 +11,16 @@ namespace agail {
 // Joins the other ranks if a launcher (mpirun, srun) started this process, else returns a
 // communicator for one. InputError if there are several ranks and this build cannot join them.
 std::unique_ptr<Communicator> join_ranks();
+
+// What the launcher says of this process; none without a launcher.
+struct LaunchedProcess {
+  int rank = 0, ranks = 1;
+};
+std::optional<LaunchedProcess> launched_process();
+
+// Takes the launcher's variables out of the environment, so that programs which this one starts do
+// not take themselves for its ranks.
+void forget_launcher();
 
 // Whether the launcher gave this process rank 0; true without a launcher. Needs no communicator.
 bool is_first_rank();

@@ -1,0 +1,160 @@
+#!/usr/bin/env python3
+"""Draws the paper's figures 2 and 3 from the records of `agail reproduce table1`, the paper's values beside (needs matplotlib).
+
+    benchmarks/table1_figures.py DIR     writes DIR/figure2.svg, .png and DIR/figure3.svg, .png
+
+Figure 2: smoothed return of the training episodes against environment steps, mean over the seeds and its standard error;
+left ours, right the paper's. Figure 3: the return at the end of that against the share of missing actions, TRPO and
+GAIL as horizontal lines. The paper's MuJoCo environments were the older v2.
+"""
+
+import argparse
+import csv
+import json
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+PAPER = ROOT / "results" / "paper"
+ENVIRONMENTS = {  # ours: the paper's name
+    "CartPole-v0": "CartPole",
+    "Hopper-v4": "Hopper",
+    "Walker2d-v4": "Walker2d",
+    "Humanoid-v4": "Humanoid",
+}
+COLOURS = {
+    "TRPO": "#333333",
+    "GAIL": "#8f5fb0",
+    "state-GAIL": "#d9822b",
+    "AGAIL.00": "#0b3c5d",
+    "AGAIL.25": "#1b6ca8",
+    "AGAIL.50": "#4c9ed9",
+    "AGAIL.75": "#8cc5ec",
+}
+
+
+def read(path: Path) -> list[dict]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def name_of(method: str, missing: float | None) -> str:
+    if method == "agail":
+        return f"AGAIL.{100 * missing:02.0f}"
+    return {"trpo": "TRPO", "gail": "GAIL", "state-gail": "state-GAIL"}[method]
+
+
+def our_curves(folder: Path) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]:
+    """(environment, method): steps, and a curve a seed."""
+    curves: dict[tuple[str, str], list] = {}
+    steps = {}
+    for path in sorted((folder / "records").glob("*.json")):
+        record = json.loads(path.read_text())
+        key = record["environment"], name_of(record["method"], record["missing"])
+        curve = record["training"]["curve"]
+        if not curve:  # no training episode ended
+            continue
+        curves.setdefault(key, []).append(curve)
+        steps[key] = np.array([*range(0, 511, 8), 511]) / 511 * record["budget"]
+    return {key: (steps[key], np.array(rows, float)) for key, rows in curves.items()}
+
+
+def paper_curves() -> dict[tuple[str, str], np.ndarray]:
+    """(environment, method): columns steps, mean, standard error."""
+    curves: dict[tuple[str, str], list] = {}
+    for row in read(PAPER / "paper_curves.csv"):
+        method = {"state": "state-GAIL"}.get(row["method"], row["method"].replace("_0.", "."))
+        key = row["env"], method
+        curves.setdefault(key, []).append([float(row[c]) for c in ("real_steps", "mean", "sem")])
+    return {key: np.array(rows) for key, rows in curves.items()}
+
+
+def band(axis: plt.Axes, x, mean, error, label: str) -> None:
+    axis.plot(x, mean, color=COLOURS[label], lw=1.2, label=label)
+    axis.fill_between(x, mean - error, mean + error, color=COLOURS[label], alpha=0.15, lw=0)
+
+
+def figure2(ours: dict, environments: list[str]) -> plt.Figure:
+    figure, axes = plt.subplots(
+        len(environments), 2, figsize=(9, 2.6 * len(environments)), layout="constrained",
+        sharey="row", squeeze=False,
+    )  # fmt: skip
+    paper = paper_curves()
+    for (left, right), environment in zip(axes, environments, strict=True):
+        for label in COLOURS:
+            if (environment, label) in ours:
+                x, rows = ours[environment, label]
+                error = rows.std(0) / np.sqrt(len(rows))
+                band(left, x, rows.mean(0), error, label)
+            points = paper.get((ENVIRONMENTS[environment], label))
+            if points is not None:
+                band(right, points[:, 0], points[:, 1], points[:, 2], label)
+        left.set_title(f"{environment}, this project", fontsize=9)
+        version = "v0" if environment.startswith("CartPole") else "v2"
+        right.set_title(f"{ENVIRONMENTS[environment]}-{version}, the paper's logs", fontsize=9)
+        left.set_ylabel("training return")
+        for axis in (left, right):
+            axis.xaxis.set_major_formatter(lambda x, _: f"{x / 1000:.0f}k")
+    axes[-1][0].set_xlabel("environment steps")
+    axes[-1][1].set_xlabel("environment steps")
+    axes[0][1].legend(fontsize=7, loc="best")
+    return figure
+
+
+def figure3(table: list[dict], environments: list[str]) -> plt.Figure:
+    figure, axes = plt.subplots(
+        1, len(environments), figsize=(3.2 * len(environments), 3), layout="constrained",
+        squeeze=False,
+    )  # fmt: skip
+    for axis, environment in zip(axes[0], environments, strict=True):
+        rows = [row for row in table if row["environment"] == environment and row["mean"]]
+        for prefix, colour, style in (("", "#1b6ca8", "-"), ("paper_", "#999999", ":")):
+            whose = "paper" if prefix else "ours"
+            agail = [r for r in rows if r["method"] == "agail"]
+            axis.errorbar(
+                [100 * float(r["missing"]) for r in agail],
+                [float(r[f"{prefix}mean"]) for r in agail],
+                [float(r[f"{prefix}standard_error"]) for r in agail],
+                color=colour, linestyle=style, marker="o", ms=3, capsize=2, label=f"AGAIL, {whose}",
+            )  # fmt: skip
+            for method, line in (("trpo", "#333333"), ("gail", "#8f5fb0")):
+                for row in rows:
+                    if row["method"] == method:
+                        axis.axhline(
+                            float(row[f"{prefix}mean"]), color=line, linestyle=style, lw=0.9,
+                            label=f"{name_of(method, None)}, {whose}",
+                        )  # fmt: skip
+        axis.set_title(environment, fontsize=9)
+        axis.set_xlabel("missing actions, %")
+    axes[0][0].set_ylabel("return (the paper's statistic)")
+    axes[0][-1].legend(fontsize=6)
+    return figure
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path, help="the --out of agail reproduce table1")
+    folder = parser.parse_args().folder
+    if not (folder / "table.csv").exists():
+        parser.error(f"{folder}/table.csv: no such file; run agail reproduce table1 first")
+    table = read(folder / "table.csv")
+    environments = [e for e in ENVIRONMENTS if any(row["environment"] == e for row in table)]
+    plt.rcParams["svg.hashsalt"] = "agail"
+    for name, figure in {
+        "figure2": figure2(our_curves(folder), environments),
+        "figure3": figure3(table, environments),
+    }.items():
+        figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
+        figure.savefig(folder / f"{name}.png", dpi=150)
+        print(folder / f"{name}.svg", folder / f"{name}.png")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,196 @@
+#include "agail/reproduce/grid.h"
+
+#include <algorithm>
+#include <map>
+
+#include "agail/base/atomic_file.h"
+#include "agail/base/error.h"
+#include "agail/reproduce/child_process.h"
+#include "agail/reproduce/demonstrations.h"
+#include "agail/reproduce/record.h"
+
+namespace agail {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Whoever starts first writes what the folder is for; everyone else must want the same.
+void claim(const fs::path& folder, const char* name, const std::string& description) {
+  create_output_folder(folder);
+  const fs::path file = folder / name;
+  if (!fs::exists(file)) write_file_atomically(file, description);
+  const std::vector<std::uint8_t> bytes = read_file(file);
+  if (std::string(bytes.begin(), bytes.end()) != description)
+    throw InputError(file.string() +
+                     ": this folder was begun with another preset, --timesteps, --set or other "
+                     "settings of the preset; give another folder");
+}
+
+double seconds(const std::string& environment, const Settings& settings) {
+  return 1e-6 * table_environment(environment).step_microseconds *
+         static_cast<double>(settings.run.timesteps);
+}
+
+class GridBuilder {
+ public:
+  GridBuilder(const Experiment& experiment, const fs::path& out, const fs::path& experts)
+      : experiment_(experiment), out_(out), experts_(experts) {}
+
+  Grid build(std::vector<GridRun> runs) {
+    const auto cost = [&](const std::string& environment) {
+      return seconds(environment, experiment_.settings(environment));
+    };
+    std::vector<std::string> environments;  // that need demonstrations
+    for (const GridRun& run : runs)
+      if (run.cell.missing && std::find(environments.begin(), environments.end(),
+                                        run.cell.environment) == environments.end())
+        environments.push_back(run.cell.environment);
+    std::stable_sort(environments.begin(), environments.end(),
+                     [&](const std::string& a, const std::string& b) { return cost(a) > cost(b); });
+    for (const std::string& environment : environments)
+      for (const std::uint64_t seed : kExpertSeeds) add_expert(environment, seed);
+    for (const std::string& environment : environments) add_demonstrations(environment);
+    for (const GridRun& run : runs) add_run(run);
+    return std::move(grid_);
+  }
+
+ private:
+  std::size_t add(Job job, std::optional<Cell> cell = {}) {
+    grid_.jobs.push_back(std::move(job));
+    grid_.cells.push_back(std::move(cell));
+    return grid_.jobs.size() - 1;
+  }
+
+  // `agail train ... --resume` goes on where an earlier process stopped.
+  static std::vector<std::string> train(const std::string& environment, const std::string& method,
+                                        const std::string& preset, std::uint64_t seed,
+                                        const Settings& settings, const fs::path& run,
+                                        std::vector<std::string> assignments = {}) {
+    assignments.push_back("run.evaluate_every=" + std::to_string(settings.run.evaluate_every));
+    std::vector<std::string> arguments = {
+        "train",     environment, "--method",    method,
+        "--preset",  preset,      "--seed",      std::to_string(seed),
+        "--threads", "1",         "--timesteps", std::to_string(settings.run.timesteps),
+        "--resume",  "--out",     run.string()};
+    for (const std::string& assignment : assignments)
+      arguments.insert(arguments.end(), {"--set", assignment});
+    return arguments;
+  }
+
+  void add_expert(const std::string& environment, std::uint64_t seed) {
+    const std::string id = environment + "-" + std::to_string(seed);
+    const Settings settings = experiment_.expert_settings(environment);
+    const fs::path run = experts_ / "runs" / id, record = experts_ / "records" / (id + ".json");
+    const auto arguments = train(environment, "trpo", kExpertPreset, seed, settings, run);
+    expert_jobs_[environment].push_back(
+        add({.title = environment + " expert seed " + std::to_string(seed),
+             .result = record,
+             .lock = experts_ / "locks" / id,
+             .log = experts_ / "logs" / (id + ".log"),
+             .needs = {},
+             .steps = {[=] { return execute_ourselves(arguments); },
+                       [=] {
+                         write_expert_record(record, run, environment, seed);
+                         return 0;
+                       }},
+             .cost = seconds(environment, settings),
+             .progress = run / "progress.csv",
+             .timesteps = static_cast<double>(settings.run.timesteps)}));
+  }
+
+  void add_demonstrations(const std::string& environment) {
+    DemonstrationPlan plan{environment,
+                           experiment_.demonstrations(),
+                           {},
+                           {},
+                           out_ / "demonstrations" / environment,
+                           out_ / "records" / "demonstrations" / (environment + ".json")};
+    for (const std::uint64_t seed : kExpertSeeds) {
+      const std::string id = environment + "-" + std::to_string(seed);
+      plan.candidate_records.push_back(experts_ / "records" / (id + ".json"));
+      plan.candidate_runs.push_back(experts_ / "runs" / id);
+    }
+    demonstration_jobs_[environment] =
+        add({.title = environment + " demonstrations",
+             .result = plan.record,
+             .lock = out_ / "locks" / ("demonstrations-" + environment),
+             .log = out_ / "logs" / ("demonstrations-" + environment + ".log"),
+             .needs = expert_jobs_[environment],
+             .steps = {[plan] {
+               make_demonstrations(plan);
+               return 0;
+             }},
+             .cost = 1,
+             .progress = {},
+             .timesteps = 0});
+  }
+
+  void add_run(const GridRun& run) {
+    const std::string& environment = run.cell.environment;
+    const Settings settings = experiment_.settings(environment);
+    const fs::path folder = out_ / "runs" / run.id(),
+                   record = out_ / "records" / (run.id() + ".json");
+    std::vector<std::string> arguments = train(environment, run.cell.method, experiment_.preset,
+                                               run.seed, settings, folder, experiment_.assignments);
+    std::vector<std::size_t> needs;
+    if (run.cell.missing) {
+      const fs::path demos = out_ / "demonstrations" / environment;
+      arguments.insert(arguments.end(),
+                       {"--demos", demonstrations_file(demos, *run.cell.missing).string()});
+      needs = {demonstration_jobs_[environment]};
+    }
+    const Experiment experiment = experiment_;
+    add({.title = run.title(),
+         .result = record,
+         .lock = out_ / "locks" / run.id(),
+         .log = out_ / "logs" / (run.id() + ".log"),
+         .needs = needs,
+         .steps = {[=] { return execute_ourselves(arguments); },
+                   [=] {
+                     write_run_record(record, folder, run, experiment);
+                     return 0;
+                   }},
+         .cost = seconds(environment, settings),
+         .progress = folder / "progress.csv",
+         .timesteps = static_cast<double>(settings.run.timesteps)},
+        run.cell);
+  }
+
+  const Experiment& experiment_;
+  fs::path out_, experts_;
+  Grid grid_;
+  std::map<std::string, std::vector<std::size_t>> expert_jobs_;
+  std::map<std::string, std::size_t> demonstration_jobs_;
+};
+
+// The longest first, then every n-th: each part gets as much of each kind.
+std::vector<GridRun> runs_of(const Experiment& experiment, const GridFilter& filter, Shard shard) {
+  std::vector<GridRun> runs = grid_runs(filter);
+  const auto cost = [&](const GridRun& run) {
+    return seconds(run.cell.environment, experiment.settings(run.cell.environment));
+  };
+  std::stable_sort(runs.begin(), runs.end(),
+                   [&](const GridRun& a, const GridRun& b) { return cost(a) > cost(b); });
+  std::vector<GridRun> own;
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    if (i % static_cast<std::size_t>(shard.count) == static_cast<std::size_t>(shard.index))
+      own.push_back(runs[i]);
+  return own;
+}
+
+}  // namespace
+
+Grid prepare_grid(const Experiment& experiment, const GridFilter& filter, Shard shard,
+                  const fs::path& out, const fs::path& experts) {
+  const std::vector<GridRun> runs = runs_of(experiment, filter, shard);
+  claim(out, "experiment.json", experiment.description());
+  for (const char* name : {"records/demonstrations", "runs", "demonstrations", "logs", "locks"})
+    create_output_folder(out / name);
+  claim(experts, "experts.json", experiment.expert_description());
+  for (const char* name : {"records", "runs", "logs", "locks"})
+    create_output_folder(experts / name);
+  return GridBuilder(experiment, out, experts).build(runs);
+}
+
+}  // namespace agail
