@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """How the cost of a sample grows; writes results/growth.csv and the tables of docs/performance.md.
 
-    benchmarks/growth.py [--work DIR] [--quick] [--only PART]
+    benchmarks/growth.py [--work DIR] [--rounds N] [--quick] [--only PART]
     benchmarks/growth_figures.py                        draws docs/figures/growth-*.svg from results/growth.csv
 
 Parts: batch (samples an update), width (units of each hidden layer), observations (environments of different sizes),
 demonstrations (their number, with the guide's nearest-state look-up), file (reading and training from large HDF5 files), threads,
-ranks. All but `file` come from `agail bench`, method agail, preset paper, half of the actions missing, in rounds of which the
-median counts; learning is what training costs beyond pure stepping.
+ranks. All but `file` come from `agail bench`, method agail, preset paper, half of the actions missing, in --rounds of which
+the median counts; learning is all of training but the time spent in the environment.
 
 What was measured is kept in --work; run it again after an interruption, remove DIR/measurements*.json to start anew. --quick:
 one round of small sizes, to see that everything works. Leave the machine alone meanwhile.
@@ -36,10 +36,9 @@ COLUMNS += ["guide_us", "peak_memory_mb", "seconds"]
 
 
 class Growth:
-    def __init__(self, work: Path, quick: bool):
+    def __init__(self, work: Path, rounds: int, quick: bool):
         work.mkdir(parents=True, exist_ok=True)
-        self.work, self.quick = work, quick
-        self.rounds = 1 if quick else 3
+        self.work, self.rounds, self.quick = work, rounds, quick
         build = hashlib.sha256(Path(AGAIL).read_bytes()).hexdigest()[:12]
         self.path = work / f"measurements-{build}{'-quick' if quick else ''}.json"
         self.kept = json.loads(self.path.read_text()) if self.path.exists() else {}
@@ -67,7 +66,7 @@ class Growth:
             return {
                 "stepping_us": result["stepping_us"],
                 "training_us": result["training_us"],
-                "learning_us": result["training_us"] - result["stepping_us"],
+                "learning_us": result["training_us"] - result["split_us"]["physics"],
                 "guide_us": result["split_us"].get("guide", 0),
                 "peak_memory_mb": result["peak_memory_bytes"] / 1e6,
             }
@@ -89,7 +88,7 @@ class Growth:
             [
                 (
                     {"part": "batch", "variant": "Hopper-v5", "x": size, "size": size},
-                    lambda turn, size=size: self.bench("Hopper-v5", turn, 1 << 17, batch=size),
+                    lambda turn, size=size: self.bench("Hopper-v5", turn, 1 << 16, batch=size),
                 )
                 for size in sizes
             ]
@@ -124,7 +123,7 @@ class Growth:
             [
                 (
                     {"part": "observations", "variant": name, "x": size, "size": size},
-                    lambda turn, name=name: self.bench(name, turn, 1 << 16, *same),
+                    lambda turn, name=name: self.bench(name, turn, 1 << 15, *same),
                 )
                 for name, size in environments.items()
             ]
@@ -314,15 +313,17 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--work", type=Path, default=ROOT / "runs/growth")
-    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--quick", action="store_true", help="one round of small sizes")
     parser.add_argument("--only", choices=PARTS, action="append")
     options = parser.parse_args()
-    growth = Growth(options.work.resolve(), options.quick)
+    rounds = 1 if options.quick else options.rounds
+    growth = Growth(options.work.resolve(), rounds, options.quick)
     parts = options.only or PARTS
-    command = "benchmarks/growth.py" + (" --quick" if options.quick else "")
+    command = "benchmarks/growth.py" + (" --quick" if options.quick else f" --rounds {rounds}")
     about = (
         f"`{command}`, {date.today()}, {cpu_model()}, {len(os.sched_getaffinity(0))} CPUs, Linux {platform.release()}"
-        + (": one round, too short to be quoted." if options.quick else ": medians of 3 rounds.")
+        + (": one round, too short to be quoted." if options.quick else f": median of {rounds} rounds.")
     )
     rows = []
     for part in parts:
