@@ -135,7 +135,10 @@ RegressionReport fit_actions(const PolicyNetwork<float>& network, Vector<float>&
   RegressionReport report;
   report.validation_loss = std::numeric_limits<double>::infinity();
 
-  for (std::int64_t epoch = 1; epoch <= settings.epochs && interrupted() == 0; ++epoch) {
+  // An interrupt ends a fit before training, of which nothing is kept. A later round is part of an
+  // update, after which a checkpoint is saved: it is finished first.
+  const auto stops = [&] { return settings.round == 0 && interrupted() != 0; };
+  for (std::int64_t epoch = 1; epoch <= settings.epochs && !stops(); ++epoch) {
     RandomStream order(seed, purpose, 0, static_cast<std::uint32_t>(epoch), settings.round);
     shuffle(training, order);
     const double rate = settings.learning_rate *

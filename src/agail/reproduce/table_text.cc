@@ -18,9 +18,9 @@ std::string number(double value, int decimals) {
   return text;
 }
 
-// 12345.6 as 12,346; small returns keep a decimal.
-std::string readable(double value) {
-  if (std::abs(value) < 1000) return number(value, 1);
+// 12345.6 as 12,346; small returns keep a decimal, counts none.
+std::string readable(double value, int decimals = 1) {
+  if (std::abs(value) < 1000) return number(value, decimals);
   std::string digits = std::to_string(std::llabs(std::llround(value)));
   for (auto at = static_cast<std::ptrdiff_t>(digits.size()) - 3; at > 0; at -= 3)
     digits.insert(static_cast<std::size_t>(at), ",");
@@ -62,7 +62,7 @@ std::string environment_table(std::span<const CellSummary> cells, const std::str
             readable(cell.worst()) + " | " +
             (cell.share_of_expert() ? percent(*cell.share_of_expert()) : "-") + " | ";
     if (cell.expert_return)
-      text += (cell.steps_to_95 ? readable(std::round(*cell.steps_to_95)) : "never") + " (" +
+      text += (cell.steps_to_95 ? readable(*cell.steps_to_95, 0) : "never") + " (" +
               std::to_string(cell.seeds_at_95) + " of " + std::to_string(cell.seeds) + ")";
     else
       text += "-";
@@ -138,8 +138,8 @@ std::string experts(const TableData& data) {
               readable(d.expert.evaluation.worst_return) + " | " +
               std::to_string(d.choice.episodes) + " episodes of " +
               (d.choice.sampled ? "sampled actions" : "the mean action") + ", " +
-              readable(static_cast<double>(d.transitions)) + " steps | " + readable(d.mean_return) +
-              " |\n";
+              readable(static_cast<double>(d.transitions), 0) + " steps | " +
+              readable(d.mean_return) + " |\n";
     }
   return text;
 }
