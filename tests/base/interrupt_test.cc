@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+
 namespace agail {
 namespace {
 
@@ -27,6 +29,35 @@ TEST(InterruptDeathTest, SecondSignalEndsTheProcess) {
         std::raise(SIGINT);
       },
       testing::KilledBySignal(SIGINT), "");
+}
+
+std::sig_atomic_t handled = 0;
+
+TEST(Interrupt, SecondSignalGoesToTheHandlerThatWasThere) {
+  const auto before = std::signal(SIGINT, [](int) { handled = 1; });
+  {
+    const InterruptGuard guard;
+    std::raise(SIGINT);
+    EXPECT_EQ(handled, 0);
+    std::raise(SIGINT);
+    EXPECT_EQ(handled, 1);
+  }
+  handled = 0;
+  std::raise(SIGINT);
+  EXPECT_EQ(handled, 1);
+  std::signal(SIGINT, before);
+}
+
+TEST(Interrupt, GuardsOfSeveralThreadsShareIt) {
+  auto first = std::make_unique<InterruptGuard>();
+  auto second = std::make_unique<InterruptGuard>();
+  std::raise(SIGTERM);
+  first.reset();  // in the order in which they were built
+  EXPECT_EQ(interrupted(), SIGTERM);
+  second.reset();
+  struct sigaction now {};
+  sigaction(SIGTERM, nullptr, &now);
+  EXPECT_EQ(now.sa_handler, SIG_DFL);
 }
 
 TEST(InterruptDeathTest, GuardRestoresWhatWasThere) {

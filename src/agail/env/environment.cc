@@ -15,11 +15,12 @@ StepResult Environment::step(std::span<const float> action) {
   ++elapsed_;
   // As Gymnasium's TimeLimit: an episode that ends by itself in its last step is terminated and
   // truncated.
-  result.truncated = elapsed_ >= spec_.max_episode_steps;
+  if (spec_.max_episode_steps > 0 && elapsed_ >= spec_.max_episode_steps) result.truncated = true;
   return result;
 }
 
 std::vector<double> Environment::save() const {
+  if (!can_save()) return {};
   std::vector<double> state = do_save();
   state.insert(state.begin(), static_cast<double>(elapsed_));
   return state;

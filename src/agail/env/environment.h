@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,7 +18,7 @@ struct EnvironmentSpec {
   int observation_dim = 0;
   bool observation_is_float32 = false;  // Gymnasium's dtype; values are handed out as double
   ActionSpace action;
-  int max_episode_steps = 0;
+  int max_episode_steps = 0;  // 0: the environment itself tells when an episode is truncated
 };
 
 struct StepResult {
@@ -46,6 +47,7 @@ class Environment {
   virtual std::span<const double> observation() const = 0;
 
   // The whole state, elapsed steps included: an environment restored from it continues bit for bit.
+  // Empty if the environment cannot save its state; then its episode cannot be continued.
   std::vector<double> save() const;
   // Throws InputError if `state` is not of this environment's size.
   void restore(std::span<const double> state);
@@ -53,7 +55,9 @@ class Environment {
  protected:
   explicit Environment(EnvironmentSpec spec) : spec_(std::move(spec)) {}
   virtual void do_reset(RandomStream& random) = 0;
-  virtual StepResult do_step(std::span<const float> action) = 0;  // truncated is set by step()
+  // `truncated` only for endings other than spec().max_episode_steps.
+  virtual StepResult do_step(std::span<const float> action) = 0;
+  virtual bool can_save() const { return true; }
   virtual std::vector<double> do_save() const = 0;
   virtual void do_restore(std::span<const double> state) = 0;
 
@@ -74,5 +78,30 @@ std::string physics_version();
 
 // The spec without building an environment.
 EnvironmentSpec environment_spec(const std::string& id);
+// None if `id` is unknown.
+std::optional<EnvironmentSpec> find_environment_spec(const std::string& id);
+
+// Where environments come from that are not built in.
+class EnvironmentSource {
+ public:
+  virtual ~EnvironmentSource() = default;
+  // Null: not an id of this source.
+  virtual std::unique_ptr<Environment> make(const std::string& id) = 0;
+  // None: not an id of this source.
+  virtual std::optional<EnvironmentSpec> spec(const std::string& id) = 0;
+};
+
+// While it lives, make_environment() and environment_spec() on this thread ask `source` first, the
+// newest of several alone. Environments may outlive it.
+class EnvironmentScope {
+ public:
+  explicit EnvironmentScope(EnvironmentSource& source);
+  ~EnvironmentScope();
+  EnvironmentScope(const EnvironmentScope&) = delete;
+  EnvironmentScope& operator=(const EnvironmentScope&) = delete;
+
+ private:
+  EnvironmentSource* previous_;
+};
 
 }  // namespace agail

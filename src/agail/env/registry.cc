@@ -1,4 +1,6 @@
 // Ids to environments.
+#include <utility>
+
 #include "agail/base/error.h"
 #include "agail/base/nearest.h"
 #include "agail/env/cartpole.h"
@@ -11,6 +13,8 @@ namespace {
 
 constexpr const char* kCartPoleIds[] = {"CartPole-v0", "CartPole-v1"};
 constexpr int kCartPoleSteps[] = {200, 500};
+
+thread_local EnvironmentSource* current_source = nullptr;
 
 [[noreturn]] void refuse(const std::string& id) {
   const std::vector<std::string> ids = environment_ids();
@@ -26,7 +30,14 @@ std::vector<std::string> environment_ids() {
   return ids;
 }
 
+EnvironmentScope::EnvironmentScope(EnvironmentSource& source)
+    : previous_(std::exchange(current_source, &source)) {}
+
+EnvironmentScope::~EnvironmentScope() { current_source = previous_; }
+
 std::unique_ptr<Environment> make_environment(const std::string& id) {
+  if (current_source != nullptr)
+    if (auto environment = current_source->make(id)) return environment;
   for (std::size_t i = 0; i < std::size(kCartPoleIds); ++i)
     if (id == kCartPoleIds[i]) return std::make_unique<CartPole>(id, kCartPoleSteps[i]);
   for (const LocomotionTask& task : locomotion_tasks())
@@ -34,11 +45,18 @@ std::unique_ptr<Environment> make_environment(const std::string& id) {
   refuse(id);
 }
 
-EnvironmentSpec environment_spec(const std::string& id) {
+std::optional<EnvironmentSpec> find_environment_spec(const std::string& id) {
+  if (current_source != nullptr)
+    if (auto spec = current_source->spec(id)) return spec;
   for (std::size_t i = 0; i < std::size(kCartPoleIds); ++i)
     if (id == kCartPoleIds[i]) return CartPole::make_spec(id, kCartPoleSteps[i]);
   for (const LocomotionTask& task : locomotion_tasks())
     if (id == task.id) return locomotion_spec(task);
+  return std::nullopt;
+}
+
+EnvironmentSpec environment_spec(const std::string& id) {
+  if (auto spec = find_environment_spec(id)) return *spec;
   refuse(id);
 }
 

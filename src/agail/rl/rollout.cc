@@ -18,11 +18,6 @@ Batch::Batch(int observation_dim, int action_dim, Index lane_count, Index steps_
   finished.reserve(static_cast<std::size_t>(size()));
 }
 
-void clip_action(const ActionSpace& space, const float* sampled, float* executed) {
-  for (std::size_t i = 0; i < static_cast<std::size_t>(space.dim); ++i)
-    executed[i] = space.discrete ? sampled[i] : std::clamp(sampled[i], space.low[i], space.high[i]);
-}
-
 Collector::Collector(const std::string& environment, Index lanes, std::uint64_t seed, Team team)
     : seed_(seed),
       team_(team),
@@ -189,7 +184,11 @@ void Collector::archive(Archive& a) {
     if (!a.loading() || !lane.environment) continue;
     lane.episode = state.episode;
     lane.episode_return = state.episode_return;
-    if (lane.episode >= 0) lane.environment->restore(state.environment);
+    if (lane.episode < 0) continue;
+    if (state.environment.empty())  // it cannot save its state: a new episode
+      start_episode(static_cast<Index>(i));
+    else
+      lane.environment->restore(state.environment);
   }
 }
 
