@@ -1,15 +1,13 @@
 // agail convert: plain arrays to demonstrations.
-#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 
 #include "agail/base/error.h"
 #include "agail/demos/csv_table.h"
-#include "agail/demos/gymnasium_spec.h"
 #include "agail/demos/minari_writer.h"
 #include "agail/demos/npz_table.h"
-#include "agail/env/environment.h"
+#include "agail/train/table_demonstrations.h"
 #include "commands.h"
 #include "inspect_demos.h"
 
@@ -37,22 +35,8 @@ StepTable read_table(const std::string& path) {
 }
 
 void run(const Options& options) {
-  if (!is_gymnasium_id(options.environment))
-    throw InputError("'" + options.environment +
-                     "' is no Gymnasium id; give one such as Hopper-v5");
-  StepTable table = read_table(options.input);
-  std::optional<ActionSpace> known;
-  const std::vector<std::string> ids = environment_ids();
-  if (std::find(ids.begin(), ids.end(), options.environment) != ids.end()) {
-    const EnvironmentSpec spec = environment_spec(options.environment);
-    if (table.observations.cols() != spec.observation_dim)
-      throw InputError(options.input + " has observations of " +
-                       std::to_string(table.observations.cols()) + " numbers, " +
-                       options.environment + " of " + std::to_string(spec.observation_dim));
-    known = spec.action;
-    table.observations_are_float32 = spec.observation_is_float32;
-  }
-  const Demonstrations demonstrations = demonstrations_from(table, options.environment, known);
+  const Demonstrations demonstrations =
+      demonstrations_of(read_table(options.input), options.environment);
   write_demonstrations(demonstrations, options.output);
   describe_demonstrations(demonstrations, false, std::cout);
 }

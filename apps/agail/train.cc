@@ -1,59 +1,34 @@
 // agail train: a policy from an environment's reward, or from demonstrations.
-#include <algorithm>
 #include <iostream>
 #include <memory>
 
-#include "agail/base/nearest.h"
-#include "agail/base/thread_pool.h"
-#include "agail/comm/launch.h"
 #include "agail/comm/together.h"
-#include "agail/config/resolve.h"
 #include "agail/config/settings_reference.h"
 #include "agail/demos/minari_reader.h"
 #include "agail/train/run.h"
+#include "agail/train/task_request.h"
 #include "commands.h"
 
 namespace agail {
 namespace {
 
-const std::vector<std::string> kMethods = {"trpo", "gail", "state-gail", "agail", "bc", "bco"};
-
-struct Options {
-  std::string environment, method, out, demos;
-  std::string preset = "default";
-  std::vector<std::string> assignments;
-  std::int64_t timesteps = 0, lanes = 0;
-  std::uint64_t seed = 0;
-  int threads = 0;
+struct Options : TaskRequest {
+  std::string out, demos;
   bool resume = false;
 };
 
 // With --resume and no settings of its own, a run goes on with those that it was started with.
-SettingsSource source_of(const Options& options, bool preset_given) {
-  SettingsSource source{options.preset, options.environment, options.assignments};
+TaskRequest request_of(const Options& options, bool preset_given) {
+  TaskRequest request = options;
   const std::filesystem::path config = std::filesystem::path(options.out) / "config.toml";
   if (options.resume && !preset_given && options.assignments.empty() &&
       std::filesystem::exists(config))
-    source.preset = config.string();
-  if (options.timesteps > 0)
-    source.assignments.push_back("run.timesteps=" + std::to_string(options.timesteps));
-  if (options.lanes > 0) source.assignments.push_back("run.lanes=" + std::to_string(options.lanes));
-  return source;
+    request.preset = config.string();
+  return request;
 }
 
 TrainingTask make_task(const Options& options, bool preset_given, bool first_rank) {
-  if (std::find(kMethods.begin(), kMethods.end(), options.method) == kMethods.end())
-    throw InputError("--method " + options.method + ": no such method; did you mean '" +
-                     nearest(options.method, kMethods) + "'? (trpo gail state-gail agail bc bco)");
-  environment_spec(options.environment);  // an unknown id is told before anything else
-  TrainingTask task;
-  task.environment = options.environment;
-  task.method = options.method;
-  task.settings = resolve_settings(source_of(options, preset_given));
-  task.settings_toml = to_toml(task.settings);
-  task.seed = options.seed;
-  task.threads = options.threads > 0 ? options.threads
-                                     : std::max(1, default_threads() / ranks_on_this_machine());
+  TrainingTask task = make_training_task(request_of(options, preset_given));
   if (!options.demos.empty()) task.demonstrations = read_demonstrations(options.demos);
   if (task.demonstrations && !task.demonstrations->environment.empty() &&
       task.demonstrations->environment != options.environment && first_rank)
@@ -67,7 +42,7 @@ void run(const Options& options, bool preset_given, Communicator& communicator) 
   TrainingTask task;
   together(communicator, [&] { task = make_task(options, preset_given, first_rank); });
   const RunOutcome outcome =
-      run_training(std::move(task), options.out, options.resume, communicator);
+      run_training(std::move(task), options.out, {.resume = options.resume}, communicator);
   if (outcome.signal != 0) {
     if (first_rank)
       std::cerr << "agail: stopped at " << outcome.timesteps << " steps; go on with --resume\n";

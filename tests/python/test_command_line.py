@@ -237,5 +237,5 @@ def test_no_such_extension(agail, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     assert "agail-hello" in agail.refused("hello")
     assert "'eval'" in agail.refused("evla")
-    for command in ("report", "video"):
+    for command in ("export", "report", "video"):
         assert "Python package" in agail.refused(command)

@@ -61,7 +61,7 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
                                     {"method", task.method},
                                     {"seed", task.seed},
                                     {"timesteps", outcome.timesteps},
-                                    {"finished", outcome.signal == 0}};
+                                    {"finished", outcome.signal == 0 && !outcome.stopped}};
   const auto add = [&](const char* name, const std::optional<Evaluation>& evaluation) {
     if (!evaluation || evaluation->returns.empty()) return;
     summary[name] = {{"episodes", evaluation->returns.size()},
@@ -115,29 +115,35 @@ void tell_start(const Trainer& trainer) {
 // Prepares, then trains. What only rank 0 does (files, the log) does not change the state.
 class Run {
  public:
-  Run(TrainingTask task, fs::path folder, bool resume, Communicator& communicator)
+  Run(TrainingTask task, fs::path folder, RunOptions options, Communicator& communicator)
       : settings_(task.settings.run),
         folder_(std::move(folder)),
-        resume_(resume),
+        options_(std::move(options)),
         communicator_(communicator),
         first_(communicator.rank() == 0) {
     together(communicator_, [&] {
-      if (first_) check_folder(folder_, resume_);
+      if (first_) check_folder(folder_, options_.resume);
       // A task that makes no sense ends here, and leaves nothing behind.
       trainer_ = std::make_unique<Trainer>(std::move(task), communicator_);
     });
   }
 
-  // Everything before the first update; false if a signal came.
+  // Everything before the first update; false if it is to stop.
   bool prepare();
   void train();
   const RunOutcome& outcome() const { return outcome_; }
 
  private:
-  // The first signal that any rank noted, known to all: they must stop after the same update.
-  bool interrupted_anywhere() {
-    if (outcome_.signal == 0) outcome_.signal = largest(communicator_, interrupted());
-    return outcome_.signal != 0;
+  // Whether any rank noted a signal or was told to stop, known to all: they must stop after the
+  // same update.
+  bool must_stop() {
+    constexpr int kStopped = 1 << 16;  // above all signals
+    if (outcome_.signal == 0 && !outcome_.stopped) {
+      const int reason = largest(communicator_, told_to_stop_ ? kStopped : interrupted());
+      outcome_.stopped = reason == kStopped;
+      if (!outcome_.stopped) outcome_.signal = reason;
+    }
+    return outcome_.signal != 0 || outcome_.stopped;
   }
   std::optional<Evaluation> evaluate_now();
   void save();
@@ -146,7 +152,8 @@ class Run {
   InterruptGuard guard_;
   RunSettings settings_;
   fs::path folder_;
-  bool resume_;
+  RunOptions options_;
+  bool told_to_stop_ = false;
   Communicator& communicator_;
   bool first_;  // the rank that writes
   std::unique_ptr<Trainer> trainer_;
@@ -158,7 +165,7 @@ class Run {
 };
 
 bool Run::prepare() {
-  if (interrupted_anywhere()) return false;
+  if (must_stop()) return false;
   checkpoint_.emplace(folder_, *trainer_);
   const int other = first_that_differs(communicator_, checkpoint_->fingerprint());
   together(communicator_, [&] {
@@ -177,13 +184,14 @@ bool Run::prepare() {
   if (trainer_->cloning() && trainer_->learns_by_interaction() && settings_.evaluate_every > 0)
     outcome_.cloned = evaluate(trainer_->policy(), settings_.evaluation_episodes,
                                trainer_->task().seed, false, trainer_->team());
-  const bool resumed = resume_ && checkpoint_->load(*trainer_, best_return_);
+  const bool resumed = options_.resume && checkpoint_->load(*trainer_, best_return_);
   together(communicator_, [&] {
     if (!first_) return;
-    tell_start(*trainer_);
+    if (options_.shows_progress) tell_start(*trainer_);
     write_file_atomically(folder_ / "config.toml", trainer_->task().settings_toml);
     log_.emplace(folder_, settings_.timesteps,
-                 resumed ? std::optional(trainer_->timesteps()) : std::nullopt);
+                 resumed ? std::optional(trainer_->timesteps()) : std::nullopt,
+                 options_.shows_progress);
   });
   return true;
 }
@@ -210,19 +218,23 @@ void Run::save() {
 void Run::train() {
   Trainer& trainer = *trainer_;
   // An interrupt waits for the update and its evaluation: a second or so.
-  while (!trainer.finished() && !interrupted_anywhere()) {
+  while (!trainer.finished() && !must_stop()) {
     const UpdateReport report = trainer.update();
     std::optional<Evaluation> evaluation;
     if (settings_.evaluate_every > 0 &&
         (report.update % settings_.evaluate_every == 0 || trainer.finished()))
       evaluation = evaluate_now();
-    if (first_) log_->update(report, trainer.batch().finished, trainer.stopwatch(), evaluation);
+    if (first_) {
+      const std::vector<double> row =
+          log_->update(report, trainer.batch().finished, trainer.stopwatch(), evaluation);
+      if (options_.on_update && !options_.on_update(row)) told_to_stop_ = !trainer.finished();
+    }
     if (report.update % settings_.checkpoint_every == 0 || trainer.finished()) save();
   }
   if (trainer.learns_by_interaction() && saved_timesteps_ != trainer.timesteps()) save();
-  if (!trainer.learns_by_interaction() && !interrupted_anywhere()) evaluate_now();
+  if (!trainer.learns_by_interaction() && !must_stop()) evaluate_now();
 
-  interrupted_anywhere();
+  must_stop();
   outcome_.timesteps = trainer.timesteps();
   const Traffic traffic = total_of(communicator_, communicator_.traffic());
   if (!first_) return;
@@ -234,9 +246,9 @@ void Run::train() {
 
 }  // namespace
 
-RunOutcome run_training(TrainingTask task, const fs::path& folder, bool resume,
+RunOutcome run_training(TrainingTask task, const fs::path& folder, RunOptions options,
                         Communicator& communicator) {
-  Run run(std::move(task), folder, resume, communicator);
+  Run run(std::move(task), folder, std::move(options), communicator);
   if (!run.prepare()) return run.outcome();
   or_abort(communicator, [&] { run.train(); });
   return run.outcome();

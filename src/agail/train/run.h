@@ -3,7 +3,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 
 #include "agail/train/evaluation.h"
 #include "agail/train/trainer.h"
@@ -11,11 +13,20 @@
 namespace agail {
 
 struct RunOutcome {
-  int signal = 0;  // that interrupted it, after a checkpoint was saved; 0: done
+  int signal = 0;        // that interrupted it, after a checkpoint was saved; 0: none
+  bool stopped = false;  // by on_update, after a checkpoint was saved
   std::int64_t timesteps = 0;
   std::optional<Evaluation> cloned;  // of the start, where the policy starts cloned
   std::optional<Evaluation> best;    // trpo: of policy_best
   std::optional<Evaluation> last;    // the last evaluation
+};
+
+struct RunOptions {
+  bool resume = false;
+  bool shows_progress = true;  // a bar or lines on stderr
+  // Called on the first rank, in the thread that trains, after each update with the row that
+  // progress.csv got (columns: progress_columns()). False stops the run as a signal would.
+  std::function<bool(std::span<const double> row)> on_update{};
 };
 
 // Trains in `folder`. Without `resume` the folder must not hold a run; with it, the run goes on
@@ -23,7 +34,7 @@ struct RunOutcome {
 // if it had never stopped. Several ranks call it together, with equal tasks; rank 0 alone reads and
 // writes the folder, and all have the same outcome. A failure once training has begun ends all
 // ranks (or_abort).
-RunOutcome run_training(TrainingTask task, const std::filesystem::path& folder, bool resume,
+RunOutcome run_training(TrainingTask task, const std::filesystem::path& folder, RunOptions options,
                         Communicator& communicator = no_other_ranks());
 
 }  // namespace agail

@@ -119,9 +119,10 @@ std::vector<std::string> progress_columns() {
 std::vector<std::string> episode_columns() { return {"timesteps", "length", "return"}; }
 
 RunLog::RunLog(const std::filesystem::path& folder, std::int64_t total_timesteps,
-               std::optional<std::int64_t> resume_step)
+               std::optional<std::int64_t> resume_step, bool shown)
     : total_timesteps_(total_timesteps),
       first_timesteps_(resume_step.value_or(0)),
+      visible_(shown),
       terminal_(isatty(STDERR_FILENO) == 1),
       csv_(folder / "progress.csv", progress_columns()),
       episodes_(folder / "episodes.csv", episode_columns()),
@@ -130,8 +131,10 @@ RunLog::RunLog(const std::filesystem::path& folder, std::int64_t total_timesteps
   episodes_.truncate_after("timesteps", static_cast<double>(first_timesteps_));
 }
 
-void RunLog::update(const UpdateReport& report, std::span<const FinishedEpisode> finished,
-                    const Stopwatch& stopwatch, const std::optional<Evaluation>& evaluation) {
+std::vector<double> RunLog::update(const UpdateReport& report,
+                                   std::span<const FinishedEpisode> finished,
+                                   const Stopwatch& stopwatch,
+                                   const std::optional<Evaluation>& evaluation) {
   const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
   const double steps_per_second =
       static_cast<double>(report.timesteps - first_timesteps_) / std::max(elapsed, 1e-9);
@@ -156,11 +159,13 @@ void RunLog::update(const UpdateReport& report, std::span<const FinishedEpisode>
   const double since = std::chrono::duration<double>(Clock::now() - shown_).count();
   if (since > (terminal_ ? 0.1 : 10.0) || report.timesteps >= total_timesteps_)
     show(report, steps_per_second);
+  return values;
 }
 
 void RunLog::show(const UpdateReport& report, double steps_per_second) {
   shown_ = Clock::now();
   events_.flush();
+  if (!visible_) return;
   const double share =
       std::min(1.0, static_cast<double>(report.timesteps) / static_cast<double>(total_timesteps_));
   const double left =

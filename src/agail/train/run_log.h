@@ -25,14 +25,16 @@ std::vector<std::string> episode_columns();
 
 class RunLog {
  public:
-  // Files in `folder`. After a resume `resume_step` is the checkpoint's number of timesteps: what
-  // the files hold of later steps is dropped.
+  // Files in `folder`, and progress on stderr if `shown`. After a resume `resume_step` is the
+  // checkpoint's number of timesteps: what the files hold of later steps is dropped.
   RunLog(const std::filesystem::path& folder, std::int64_t total_timesteps,
-         std::optional<std::int64_t> resume_step);
+         std::optional<std::int64_t> resume_step, bool shown = true);
 
-  // `finished`: the training episodes that ended in this update's batch.
-  void update(const UpdateReport& report, std::span<const FinishedEpisode> finished,
-              const Stopwatch& stopwatch, const std::optional<Evaluation>& evaluation);
+  // `finished`: the training episodes that ended in this update's batch. Returns the row that
+  // progress.csv got.
+  std::vector<double> update(const UpdateReport& report, std::span<const FinishedEpisode> finished,
+                             const Stopwatch& stopwatch,
+                             const std::optional<Evaluation>& evaluation);
   // Hands everything to the operating system.
   void flush() { events_.flush(); }
   // Ends the bar, if there is one.
@@ -43,6 +45,7 @@ class RunLog {
 
   using Clock = std::chrono::steady_clock;
   std::int64_t total_timesteps_, first_timesteps_;
+  bool visible_;
   bool terminal_;
   Clock::time_point begin_ = Clock::now();
   Clock::time_point shown_;

@@ -65,15 +65,17 @@ std::vector<float> bounds(const json& values) {
 }  // namespace
 
 SavedPolicy::SavedPolicy(PolicyInfo info, int observation_dim, const ActionSpace& action,
-                         const Sizes& hidden, const Normalizer& normalizer, Vector<float> theta)
+                         const Sizes& hidden, const Normalizer& normalizer,
+                         Vector<double> standard_deviation, Vector<float> theta)
     : info_(std::move(info)),
       observation_dim_(observation_dim),
       action_(action),
       hidden_(hidden),
       normalizer_(observation_dim, normalizer.enabled(), normalizer.clip()),
+      standard_deviation_(std::move(standard_deviation)),
       network_(observation_dim, hidden, action),
       theta_(std::move(theta)) {
-  if (normalizer.enabled()) normalizer_.set(normalizer.mean(), normalizer.standard_deviation());
+  if (normalizer.enabled()) normalizer_.set(normalizer.mean(), standard_deviation_);
 }
 
 TensorStore SavedPolicy::store() const {
@@ -96,8 +98,7 @@ TensorStore SavedPolicy::store() const {
   const auto dim = static_cast<std::size_t>(observation_dim_);
   if (normalizer_.enabled()) {
     store.tensors["observation.mean"] = make_tensor<double>(DType::kF64, {dim}, normalizer_.mean());
-    store.tensors["observation.std"] =
-        make_tensor<double>(DType::kF64, {dim}, normalizer_.standard_deviation());
+    store.tensors["observation.std"] = make_tensor<double>(DType::kF64, {dim}, standard_deviation_);
   }
   json structure = {{"observation_dim", observation_dim_},
                     {"hidden", hidden_},
@@ -120,13 +121,18 @@ TensorStore SavedPolicy::store() const {
   return store;
 }
 
+std::vector<std::uint8_t> SavedPolicy::encode() const { return to_safetensors(store()); }
+
 void SavedPolicy::save(const std::filesystem::path& file) const {
-  write_file_atomically(file, to_safetensors(store()));
+  write_file_atomically(file, encode());
 }
 
 SavedPolicy SavedPolicy::load(const std::filesystem::path& file) {
-  const std::string where = file.string();
-  const TensorStore store = from_safetensors(read_file(file), where, Checksum::kRequired);
+  return decode(read_file(file), file.string());
+}
+
+SavedPolicy SavedPolicy::decode(std::span<const std::uint8_t> bytes, const std::string& where) {
+  const TensorStore store = from_safetensors(bytes, where, Checksum::kRequired);
   const auto entry = [&](const char* key) {
     const auto found = store.metadata.find(key);
     return found == store.metadata.end() ? std::string() : found->second;
@@ -167,10 +173,14 @@ SavedPolicy SavedPolicy::load(const std::filesystem::path& file) {
 
     Normalizer normalizer(observation_dim, structure.at("normalize_observations"),
                           structure.at("observation_clip"));
-    if (normalizer.enabled())
+    Vector<double> standard_deviation = Vector<double>::Ones(observation_dim);
+    if (normalizer.enabled()) {
+      standard_deviation =
+          read_tensor<double>(store, "observation.std", DType::kF64, observation_dim, 1, where);
       normalizer.set(
           read_tensor<double>(store, "observation.mean", DType::kF64, observation_dim, 1, where),
-          read_tensor<double>(store, "observation.std", DType::kF64, observation_dim, 1, where));
+          standard_deviation);
+    }
     const PolicyNetwork<float> network(observation_dim, hidden, action);
     Vector<float> theta(network.parameters());
     for (Index l = 0; l < network.mlp.layers(); ++l) {
@@ -185,7 +195,9 @@ SavedPolicy SavedPolicy::load(const std::filesystem::path& file) {
     if (!action.discrete)
       theta.tail(action.dim) =
           read_tensor<float>(store, "policy.log_std", DType::kF32, action.dim, 1, where);
-    return {std::move(info), observation_dim, action, hidden, normalizer, std::move(theta)};
+    return {std::move(info), observation_dim, action,
+            hidden,          normalizer,      std::move(standard_deviation),
+            std::move(theta)};
   } catch (const json::exception&) {
     throw InputError(
         where + ": the structure in its metadata is damaged; train or export the policy again");

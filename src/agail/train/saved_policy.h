@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "agail/base/archive.h"
@@ -30,11 +31,14 @@ struct PolicyInfo {
 class SavedPolicy {
  public:
   SavedPolicy(PolicyInfo info, int observation_dim, const ActionSpace& action, const Sizes& hidden,
-              const Normalizer& normalizer, Vector<float> theta);
+              const Normalizer& normalizer, Vector<double> standard_deviation, Vector<float> theta);
 
   // InputError, one line, for anything that is not such a file.
   static SavedPolicy load(const std::filesystem::path& file);
+  // From the bytes of such a file, named `where` in messages.
+  static SavedPolicy decode(std::span<const std::uint8_t> bytes, const std::string& where);
   TensorStore store() const;
+  std::vector<std::uint8_t> encode() const;
   void save(const std::filesystem::path& file) const;
 
   const PolicyInfo& info() const { return info_; }
@@ -63,6 +67,8 @@ class SavedPolicy {
   ActionSpace action_;
   Sizes hidden_;
   Normalizer normalizer_;
+  Vector<double>
+      standard_deviation_;  // that the normaliser was set to: its own may round otherwise
   PolicyNetwork<float> network_;
   Vector<float> theta_;
 };

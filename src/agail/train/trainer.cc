@@ -215,7 +215,8 @@ SavedPolicy Trainer::policy() const {
   if (demonstrations_) info.demonstrations_mean_return = demonstrations_->mean_return;
   return {std::move(info), spec_.observation_dim,
           spec_.action,    task_.settings.policy.hidden,
-          normalizer_,     theta_};
+          normalizer_,     normalizer_.standard_deviation(),
+          theta_};
 }
 
 void Trainer::archive(Archive& a) {

@@ -1,0 +1,28 @@
+// What a user asks for when training, and the task that it means.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "agail/train/trainer.h"
+
+namespace agail {
+
+// trpo gail state-gail agail bc bco
+const std::vector<std::string>& training_methods();
+
+struct TaskRequest {
+  std::string environment;
+  std::string method;
+  std::string preset = "default";        // a name, or the path of a TOML file
+  std::vector<std::string> assignments;  // key=value, for any setting
+  std::int64_t timesteps = 0;            // 0: as the settings say
+  std::int64_t lanes = 0;                // 0: as the settings say
+  std::uint64_t seed = 0;
+  int threads = 0;  // 0: this rank's share of the machine's or container's cores
+};
+
+// The task without demonstrations. InputError for an unknown environment, method or setting.
+TrainingTask make_training_task(const TaskRequest& request);
+
+}  // namespace agail
