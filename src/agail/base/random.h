@@ -29,6 +29,7 @@ enum class Purpose : std::uint32_t {
   kInverseDynamics = 13,
   kBootstrap = 14,  // resampling of confidence intervals
   kHoldout = 15,    // which demonstrations are kept for validation
+  kPredict = 16,    // stochastic actions of a policy that is used from Python
 };
 
 class RandomStream {

@@ -11,7 +11,8 @@
 namespace agail {
 
 const std::vector<std::string>& training_methods() {
-  static const std::vector<std::string> methods = {"trpo", "gail", "state-gail", "agail", "bc"};
+  static const std::vector<std::string> methods = {"trpo",  "gail", "state-gail",
+                                                   "agail", "bc",   "bco"};
   return methods;
 }
 

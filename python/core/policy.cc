@@ -1,0 +1,222 @@
+// agail.Policy.
+#include "policy.h"
+
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include <atomic>
+#include <mutex>
+
+#include "arrays.h"
+#include "bind.h"
+
+namespace agail {
+
+namespace nb = nanobind;
+
+namespace {
+
+// Several threads may use one policy.
+class Policy {
+ public:
+  explicit Policy(SavedPolicy policy) : policy_(std::move(policy)) {}
+
+  static std::unique_ptr<Policy> load(const std::filesystem::path& path) {
+    const nb::gil_scoped_release no_gil;
+    return std::make_unique<Policy>(SavedPolicy::load(policy_file(path)));
+  }
+
+  const SavedPolicy& saved() const { return policy_; }
+
+  // Names the random numbers of stochastic actions from here on.
+  void seed(std::uint64_t seed) {
+    seed_ = seed;
+    draws_ = 0;
+  }
+
+  nb::tuple predict(const nb::object& observation, const nb::object& state, const nb::object&,
+                    bool deterministic) {
+    InputArray<double> array;
+    if (!nb::try_cast(observation, array))
+      array = nb::cast<InputArray<double>>(
+          nb::module_::import_("numpy").attr("ascontiguousarray")(observation, "float64"));
+    const auto dim = static_cast<std::size_t>(policy_.observation_dim());
+    const bool single = array.ndim() == 1;
+    if (array.ndim() < 1 || array.ndim() > 2 || array.shape(array.ndim() - 1) != dim)
+      throw InputError("this policy takes observations of shape (" + std::to_string(dim) +
+                       ",) or (n, " + std::to_string(dim) + "), not " + shape_of(array));
+    const std::size_t n = single ? 1 : array.shape(0);
+    const auto width = static_cast<std::size_t>(policy_.action().dim);
+    if (policy_.action().discrete) {
+      std::vector<float> indices(n);
+      act(array.data(), n, indices.data(), deterministic);
+      Array<std::int64_t> actions = single ? copy_array<std::int64_t>(indices.data(), {})
+                                           : copy_array<std::int64_t>(indices.data(), {n});
+      return nb::make_tuple(actions, state);
+    }
+    Array<float> actions = single ? make_array<float>({width}) : make_array<float>({n, width});
+    act(array.data(), n, actions.data(), deterministic);
+    return nb::make_tuple(actions, state);
+  }
+
+ private:
+  static std::string shape_of(const InputArray<double>& array) {
+    std::string text = "(";
+    for (std::size_t i = 0; i < array.ndim(); ++i)
+      text += (i == 0 ? "" : ", ") + std::to_string(array.shape(i));
+    return text + (array.ndim() == 1 ? ",)" : ")");
+  }
+
+  void act(const double* observations, std::size_t n, float* actions, bool deterministic) {
+    constexpr std::size_t kFew = 8;  // not worth letting other threads run
+    std::optional<nb::gil_scoped_release> no_gil;
+    if (n > kFew) no_gil.emplace();
+    const Loan loan(*this);
+    const auto dim = static_cast<std::size_t>(policy_.observation_dim());
+    const auto width = static_cast<std::size_t>(policy_.action().dim);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::span<const double> row(observations + i * dim, dim);
+      std::optional<RandomStream> random;
+      if (!deterministic) {
+        const std::uint64_t draw = draws_++;
+        random.emplace(seed_, Purpose::kPredict, static_cast<std::uint32_t>(draw >> 32),
+                       static_cast<std::uint32_t>(draw));
+      }
+      policy_.act(row, random ? &*random : nullptr, loan.workspace(), actions + i * width);
+    }
+  }
+
+  // A workspace for one call.
+  class Loan {
+   public:
+    explicit Loan(Policy& policy) : policy_(policy) {
+      const std::lock_guard lock(policy_.mutex_);
+      if (policy_.idle_.empty()) {
+        workspace_ = std::make_unique<SavedPolicy::Workspace>(policy_.policy_.make_workspace());
+      } else {
+        workspace_ = std::move(policy_.idle_.back());
+        policy_.idle_.pop_back();
+      }
+    }
+    ~Loan() {
+      const std::lock_guard lock(policy_.mutex_);
+      policy_.idle_.push_back(std::move(workspace_));
+    }
+    Loan(const Loan&) = delete;
+    Loan& operator=(const Loan&) = delete;
+    SavedPolicy::Workspace& workspace() const { return *workspace_; }
+
+   private:
+    Policy& policy_;
+    std::unique_ptr<SavedPolicy::Workspace> workspace_;
+  };
+
+  SavedPolicy policy_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<SavedPolicy::Workspace>> idle_;
+  std::atomic<std::uint64_t> seed_ = 0, draws_ = 0;
+};
+
+nb::bytes encode(const Policy& policy) {
+  const std::vector<std::uint8_t> bytes = policy.saved().encode();
+  return nb::bytes(bytes.data(), bytes.size());
+}
+
+// Name to array.
+nb::dict tensors(const Policy& policy) {
+  nb::dict result;
+  for (const auto& [name, tensor] : policy.saved().store().tensors) {
+    const nb::object array =
+        nb::module_::import_("numpy")
+            .attr("frombuffer")(nb::bytes(tensor.bytes.data(), tensor.bytes.size()),
+                                tensor.dtype == DType::kF64 ? "float64" : "float32")
+            .attr("reshape")(nb::cast(tensor.shape));
+    result[name.c_str()] = array;
+  }
+  return result;
+}
+
+nb::dict metadata(const Policy& policy) {
+  nb::dict result;
+  for (const auto& [key, value] : policy.saved().store().metadata) result[key.c_str()] = value;
+  return result;
+}
+
+SavedPolicy decode(const nb::bytes& bytes) {
+  return SavedPolicy::decode({static_cast<const std::uint8_t*>(bytes.data()), bytes.size()},
+                             "the pickled policy");
+}
+
+constexpr const char* kPredictSignature =
+    "def predict(self, observation: numpy.typing.ArrayLike, state: object = None, "
+    "episode_start: object = None, deterministic: bool = True) -> "
+    "tuple[numpy.typing.NDArray[typing.Any], object]";
+
+constexpr const char* kPredictHelp =
+    R"(The action for one observation (shape (observation_dim,)) or a batch (n, observation_dim).
+
+Returns (action, state) as stable-baselines3 does; state comes back as it was given, these policies have none, and
+episode_start is not used. Continuous actions are float32, (action_dim,) or (n, action_dim), within the bounds; discrete
+ones int64, () or (n,). The mode, or a sample if not deterministic. Observations are normalised here. A batch gives the
+same bits as its rows one by one. InputError (a ValueError) for other shapes.)";
+
+}  // namespace
+
+const SavedPolicy& saved_policy(nb::handle policy) { return nb::cast<Policy&>(policy).saved(); }
+
+void bind_policy(nb::module_& module) {
+  nb::class_<Policy>(module, "Policy",
+                     "A trained policy. Picklable; several threads may use one at once.")
+      .def_static("load", &Policy::load, nb::arg("path"),
+                  "A run folder (its best policy for trpo, the last one for other methods) or a "
+                  ".safetensors file. InputError if it is neither.")
+      .def(
+          "save",
+          [](const Policy& policy, const std::filesystem::path& path) {
+            policy.saved().save(path);
+          },
+          nb::arg("path"), "Writes one .safetensors file.")
+      .def("predict", &Policy::predict, nb::arg("observation"), nb::arg("state") = nb::none(),
+           nb::arg("episode_start") = nb::none(), nb::arg("deterministic") = true,
+           nb::sig(kPredictSignature), kPredictHelp)
+      .def("seed", &Policy::seed, nb::arg("seed"),
+           "Names the random numbers of stochastic actions from here on.")
+      .def("tensors", &tensors,
+           nb::sig("def tensors(self) -> dict[str, numpy.typing.NDArray[typing.Any]]"),
+           "The arrays of its file, by name: docs/files.md.")
+      .def("metadata", &metadata, nb::sig("def metadata(self) -> dict[str, str]"),
+           "What its file says of itself: environment, method, settings, structure (JSON)...")
+      .def("__getstate__", &encode)
+      .def("__setstate__",
+           [](Policy& policy, const nb::bytes& bytes) { new (&policy) Policy(decode(bytes)); })
+      .def_prop_ro(
+          "environment", [](const Policy& policy) { return policy.saved().info().environment; },
+          "Id of the environment that it was trained for.")
+      .def_prop_ro(
+          "method", [](const Policy& policy) { return policy.saved().info().method; },
+          "trpo gail state-gail agail bc")
+      .def_prop_ro(
+          "timesteps", [](const Policy& policy) { return policy.saved().info().timesteps; },
+          "Environment steps that it learned from.")
+      .def_prop_ro(
+          "settings_toml", [](const Policy& policy) { return policy.saved().info().settings; },
+          "All settings of its training, as TOML.")
+      .def_prop_ro(
+          "demonstrations_mean_return",
+          [](const Policy& policy) { return policy.saved().info().demonstrations_mean_return; },
+          "Mean return of the demonstrations, or None.")
+      .def_prop_ro("observation_dim",
+                   [](const Policy& policy) { return policy.saved().observation_dim(); })
+      .def_prop_ro(
+          "action_dim", [](const Policy& policy) { return policy.saved().action().dim; },
+          "Numbers of an action; 1 if discrete.")
+      .def_prop_ro(
+          "n_actions", [](const Policy& policy) { return policy.saved().action().n; },
+          "Number of discrete actions, 0 if continuous.")
+      .def_prop_ro("hidden", [](const Policy& policy) { return policy.saved().hidden(); });
+}
+
+}  // namespace agail

@@ -1,0 +1,149 @@
+// Training, evaluation, recording, and the command line.
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "agail/base/thread_pool.h"
+#include "agail/train/evaluation.h"
+#include "agail/train/run.h"
+#include "agail/train/run_log.h"
+#include "agail/train/task_request.h"
+#include "arrays.h"
+#include "bind.h"
+#include "command_line.h"
+#include "errors.h"
+#include "policy.h"
+#include "python_environment.h"
+
+namespace agail {
+
+namespace nb = nanobind;
+
+namespace {
+
+// The source of environments for this thread, or none, and no GIL meanwhile.
+class OutsidePython {
+ public:
+  explicit OutsidePython(PythonSource& source) : scope_(source) {}
+
+ private:
+  EnvironmentScope scope_;
+  nb::gil_scoped_release no_gil_;
+};
+
+// Tells a Python function of each update. Its exceptions stop the run, and come out when it has
+// been wound up.
+class UpdateCallback {
+ public:
+  explicit UpdateCallback(nb::object function)
+      : function_(std::move(function)), names_(progress_columns()) {}
+
+  // Without the GIL. False: stop.
+  bool operator()(std::span<const double> row) {
+    const nb::gil_scoped_acquire gil;
+    try {
+      if (PyErr_CheckSignals() != 0) nb::raise_python_error();
+      if (function_.is_none()) return true;
+      nb::dict values;
+      for (std::size_t i = 0; i < row.size(); ++i) values[names_[i].c_str()] = row[i];
+      const nb::object answer = function_(values);
+      return !(nb::isinstance<nb::bool_>(answer) && !nb::cast<bool>(answer));
+    } catch (const nb::python_error& error) {
+      failure_.emplace(error);
+      return false;
+    }
+  }
+
+  void rethrow() const {
+    if (failure_) throw PythonFailure(*failure_);
+  }
+
+ private:
+  nb::object function_;
+  std::vector<std::string> names_;
+  std::optional<PythonFailure> failure_;
+};
+
+// Returns (signal, stopped): the signal that interrupted it or 0, and whether the callback stopped
+// it.
+std::pair<int, bool> train(const std::string& environment, const std::string& method,
+                           const Demonstrations* demonstrations, const std::string& out,
+                           const std::string& preset, const std::vector<std::string>& assignments,
+                           std::int64_t timesteps, std::int64_t lanes, std::uint64_t seed,
+                           int threads, bool resume, bool progress, const nb::object& callback,
+                           const nb::object& source) {
+  PythonSource environments(source);
+  UpdateCallback on_update(callback);
+  const RunOutcome outcome = [&] {
+    const OutsidePython outside(environments);
+    TrainingTask task = make_training_task(
+        {environment, method, preset, assignments, timesteps, lanes, seed, threads});
+    if (demonstrations != nullptr) task.demonstrations = *demonstrations;
+    return run_training(std::move(task), out, {resume, progress, std::ref(on_update)});
+  }();
+  on_update.rethrow();
+  return {outcome.signal, outcome.stopped};
+}
+
+nb::dict evaluate_policy(const nb::object& policy, Index episodes, std::uint64_t seed,
+                         bool stochastic, int threads, const nb::object& source) {
+  PythonSource environments(source);
+  const SavedPolicy& saved = saved_policy(policy);
+  std::pair<double, double> interval;
+  const Evaluation evaluation = [&] {
+    const OutsidePython outside(environments);
+    ThreadPool pool(threads);
+    Evaluation result = evaluate(saved, episodes, seed, stochastic, pool);
+    interval = bootstrap_interval(result.returns, seed);
+    return result;
+  }();
+  nb::dict result;
+  result["returns"] = copy_array<double>(evaluation.returns.data(), {evaluation.returns.size()});
+  result["lengths"] =
+      copy_array<std::int64_t>(evaluation.lengths.data(), {evaluation.lengths.size()});
+  result["diverged"] = evaluation.diverged;
+  result["mean_return"] = evaluation.mean_return();
+  result["standard_error"] = evaluation.standard_error();
+  result["confidence_interval_95"] = interval;
+  return result;
+}
+
+Demonstrations record_policy(const nb::object& policy, Index episodes, std::uint64_t seed,
+                             bool stochastic, int threads, const nb::object& source) {
+  PythonSource environments(source);
+  const SavedPolicy& saved = saved_policy(policy);
+  const OutsidePython outside(environments);
+  ThreadPool pool(threads);
+  return record(saved, episodes, seed, stochastic, pool);
+}
+
+int run_command_line(const std::vector<std::string>& words, const nb::object& source) {
+  PythonSource environments(source);
+  std::vector<std::string> copies = words;
+  std::vector<char*> arguments;
+  for (std::string& word : copies) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  const OutsidePython outside(environments);
+  return command_line(static_cast<int>(copies.size()), arguments.data());
+}
+
+}  // namespace
+
+void bind_training(nb::module_& module) {
+  module.def("methods", &training_methods);
+  module.def("progress_columns", &progress_columns);
+  module.def("train", &train, nb::arg("environment"), nb::arg("method"),
+             nb::arg("demonstrations").none(), nb::arg("out"), nb::arg("preset"),
+             nb::arg("assignments"), nb::arg("timesteps"), nb::arg("lanes"), nb::arg("seed"),
+             nb::arg("threads"), nb::arg("resume"), nb::arg("progress"), nb::arg("callback").none(),
+             nb::arg("source"));
+  module.def("evaluate", &evaluate_policy, nb::arg("policy"), nb::arg("episodes"), nb::arg("seed"),
+             nb::arg("stochastic"), nb::arg("threads"), nb::arg("source"));
+  module.def("record", &record_policy, nb::arg("policy"), nb::arg("episodes"), nb::arg("seed"),
+             nb::arg("stochastic"), nb::arg("threads"), nb::arg("source"));
+  module.def("command_line", &run_command_line, nb::arg("words"), nb::arg("source"),
+             "The program agail, in this process: its exit code.");
+}
+
+}  // namespace agail

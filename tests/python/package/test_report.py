@@ -1,0 +1,79 @@
+"""agail report: what is on the page, and that it stands alone."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from conftest import train
+
+from agail.statistics import bootstrap_interval, iqm
+
+
+def report(*words, **options):
+    words = [str(Path(sys.executable).with_name("agail")), "report", *map(str, words)]
+    return subprocess.run(words, capture_output=True, text=True, timeout=300, **options)
+
+
+def test_iqm():
+    assert iqm(np.arange(8.0)) == 3.5
+    assert iqm(np.array([0, 1, 2, 100.0])) == 1.5
+    assert iqm(np.array([7.0])) == 7
+    # Three values: the outer ones count a quarter of the middle one.
+    assert iqm(np.array([0, 1, 8.0])) == pytest.approx((0.25 * 0 + 1 + 0.25 * 8) / 1.5)
+
+
+def test_bootstrap_interval():
+    values = np.random.default_rng(0).normal(5, 1, size=(400, 2))
+    low, high = bootstrap_interval(values, np.mean)
+    assert low.shape == (2,) and (low < 5).all() and (high > 5).all()
+    np.testing.assert_allclose(high - low, 2 * 1.96 / np.sqrt(400), rtol=0.15)
+
+
+@pytest.fixture(scope="module")
+def runs(hopper_demos, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    for ratio in (0.25, 0.75):
+        for seed in (0, 1, 2):
+            train("Hopper-v5", hopper_demos.mask(ratio), seed=seed, timesteps=2048,
+                  out=folder / f"agail-{ratio}-{seed}")  # fmt: skip
+    train("Hopper-v5", hopper_demos.mask(0.75), method="state-gail", out=folder / "state",
+          callback=lambda row: row["time/iterations"] < 2)  # fmt: skip
+    return folder
+
+
+def test_page(runs, tmp_path):
+    done = report(runs, "--out", tmp_path / "r.html", "--figures", tmp_path / "figures")
+    assert done.returncode == 0 and "7 runs" in done.stdout, done.stderr
+    text = (tmp_path / "r.html").read_text()
+    assert "7 runs" in text and "3 of 3" in text and "IQM" in text and "missing 0.75" in text
+    assert not re.search(r"(src|href)=\"?https?:|@import|url\(http", text), "from elsewhere"
+    pictures = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
+    files = sorted(path.name for path in (tmp_path / "figures").iterdir())
+    assert len(pictures) == len(files) / 2 >= 8
+    assert any("missing_ratio" in name for name in files)
+    for picture in pictures:
+        ElementTree.fromstring(picture)
+    for path in (tmp_path / "figures").glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 10_000
+
+
+def test_one_run_and_broken_ones(runs, tmp_path):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "config.toml").write_text("[run")
+    words = [runs / "state", tmp_path / "empty", tmp_path / "broken"]
+    done = report(*words, "--out", tmp_path / "r.html")
+    assert done.returncode == 0 and "1 runs" in done.stdout, done.stderr
+    text = (tmp_path / "r.html").read_text()
+    assert "empty: there is no run in this folder" in text and "broken: " in text
+
+
+def test_wrong_input(tmp_path):
+    done = report(tmp_path / "absent")
+    assert done.returncode == 2 and "no such folder" in done.stderr
+    done = report(tmp_path, "--out", tmp_path / "absent" / "r.html")
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
