@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import zipfile
 from importlib import metadata
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 import agail
 
+ROOT = Path(__file__).resolve().parents[3]
 PACKAGE = Path(agail.__file__).parent
 
 
@@ -106,3 +108,18 @@ def test_installed_at_another_path(tmp_path):
     words = ["-m", "agail", "train", "Pendulum-v1", "--method", "trpo", "--timesteps", "256",
              "--set=run.batch_steps=256", "--out", tmp_path / "run"]  # fmt: skip
     assert "mean return" in python(*words, executable=own, env=environment)
+
+
+def test_source_distribution(tmp_path):
+    """Holds whatever the build reads."""
+    code = "import sys; from scikit_build_core.build import build_sdist; build_sdist(sys.argv[1])"
+    python("-c", code, tmp_path, cwd=ROOT)
+    (archive,) = tmp_path.glob("agail-*.tar.gz")
+    with tarfile.open(archive) as file:
+        names = {name.split("/", 1)[1] for name in file.getnames() if "/" in name}
+    for folder in ("src", "apps", "python", "cmake", "models", "presets", "include"):
+        for path in (ROOT / folder).rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts:
+                assert str(path.relative_to(ROOT)) in names
+    assert {"CMakeLists.txt", "pyproject.toml", "LICENSE", "README.md"} <= names
+    assert not any(name.startswith((".venv", "build", "results")) for name in names)
