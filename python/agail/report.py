@@ -201,15 +201,11 @@ def ratio_figure(groups: list[Group]) -> Figure | None:
         middle = [iqm(np.array(returns)) for _, returns in points]
         axes.plot(ratios, middle, marker="o", color=f"C{i}", label=method)
         for ratio, returns in points:
-            low, high = bootstrap_interval(np.array(returns)[:, None], _iqm_of_columns)
+            low, high = bootstrap_interval(np.array(returns)[:, None], iqm)
             axes.plot([ratio, ratio], [low[0], high[0]], color=f"C{i}", alpha=0.6)
     axes.set_xlabel("share of the actions that is missing")
     axes.legend(fontsize=8, frameon=False)
     return figure
-
-
-def _iqm_of_columns(values: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    return np.apply_along_axis(iqm, axis, values)
 
 
 def _table(head: list[str], rows: list[list[str]], kind: str = "") -> str:
@@ -226,7 +222,7 @@ def results_table(groups: list[Group]) -> str:
         if len(returns) == 0:
             rows.append([*row, *["-"] * 4])
             continue
-        low, high = bootstrap_interval(returns[:, None], _iqm_of_columns)
+        low, high = bootstrap_interval(returns[:, None], iqm)
         interval = f"{low[0]:,.1f} to {high[0]:,.1f}" if len(returns) > 1 else "-"
         reference = group.reference()
         share = f"{100 * returns.mean() / reference:.1f} %" if reference else "-"

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 RESAMPLES = 2000
 
 
-def iqm(values: NDArray[np.float64]) -> float:
+def iqm(values: NDArray[np.float64], axis: int = 0) -> NDArray[np.float64]:
     """Mean of the middle half; the values at its ends count in part."""
-    ordered = np.sort(np.asarray(values, np.float64))
-    n = len(ordered)
-    ends = np.arange(n + 1) / n
-    weights = np.diff(np.clip(ends, 0.25, 0.75))
-    return float(ordered @ weights / weights.sum())
+    ordered = np.sort(np.asarray(values, np.float64), axis)
+    n = ordered.shape[axis]
+    weights = np.diff(np.clip(np.arange(n + 1) / n, 0.25, 0.75))
+    return np.tensordot(weights / weights.sum(), ordered, (0, axis))
 
 
 def bootstrap_interval(
