@@ -62,7 +62,7 @@ class BcoTest : public testing::Test {
     s.inverse_dynamics.hidden = {32};
     s.bco.every = 2;
     s.bco.buffer = 1500;
-    s.bco.epochs = 80;
+    s.bco.epochs = 400;
     s.start.log_std = -1.5;
     return s;
   }
