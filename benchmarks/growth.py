@@ -323,7 +323,11 @@ def main() -> None:
     command = "benchmarks/growth.py" + (" --quick" if options.quick else f" --rounds {rounds}")
     about = (
         f"`{command}`, {date.today()}, {cpu_model()}, {len(os.sched_getaffinity(0))} CPUs, Linux {platform.release()}"
-        + (": one round, too short to be quoted." if options.quick else f": median of {rounds} rounds.")
+        + (
+            ": one round, too short to be quoted."
+            if options.quick
+            else f": median of {rounds} rounds."
+        )
     )
     rows = []
     for part in parts:

@@ -72,7 +72,7 @@ def one(work: Path, environment: str, trajectories: int, missing: float, seed: i
     run = work / "time" / environment / f"{trajectories}-{missing}" / str(seed)
     summary = learn(run, environment, seed, masked(work, environment, trajectories, missing))
     goal = SHARE * demonstrated_return(run)
-    start = summary["wall_seconds"] - float(rows(run)[-1]["time/time_elapsed"])
+    start = summary["start_seconds"]
     row = reached(run, goal)
     seconds: float | str = ""
     steps: int | str = ""

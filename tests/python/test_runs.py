@@ -90,7 +90,9 @@ def test_contents(imitation, small):
     assert (small / "cartpole-expert" / "policy_best.safetensors").exists()
     summary = json.loads((imitation / "summary.json").read_text())
     assert summary["finished"] and summary["timesteps"] == 4096 and summary["seed"] == 0
-    assert {"version", "mujoco", "cpu", "threads", "ranks", "wall_seconds"} <= set(summary)
+    assert {"version", "mujoco", "cpu", "threads", "ranks", "start_seconds", "wall_seconds"} <= set(
+        summary
+    )
     assert summary["demonstrations"]["missing_ratio"] == pytest.approx(0.5, abs=0.01)
 
 

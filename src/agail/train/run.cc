@@ -97,6 +97,7 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
     summary["traffic"] = {{"messages", traffic.messages},
                           {"bytes", traffic.bytes},
                           {"seconds_of_all_ranks", traffic.seconds}};
+  summary["start_seconds"] = outcome.start_seconds;
   summary["wall_seconds"] = wall_seconds;
   write_file_atomically(folder / "summary.json", summary.dump(2) + "\n");
 }
@@ -126,6 +127,7 @@ class Run {
       // A task that makes no sense ends here, and leaves nothing behind.
       trainer_ = std::make_unique<Trainer>(std::move(task), communicator_);
     });
+    outcome_.start_seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
   }
 
   // Everything before the first update; false if it is to stop.

@@ -16,6 +16,7 @@ struct RunOutcome {
   int signal = 0;        // that interrupted it, after a checkpoint was saved; 0: none
   bool stopped = false;  // by on_update, after a checkpoint was saved
   std::int64_t timesteps = 0;
+  double start_seconds = 0;          // until there was a policy: cloning, where it starts cloned
   std::optional<Evaluation> cloned;  // of the start, where the policy starts cloned
   std::optional<Evaluation> best;    // trpo: of policy_best
   std::optional<Evaluation> last;    // the last evaluation
