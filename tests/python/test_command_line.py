@@ -4,7 +4,7 @@ import json
 import os
 
 import pytest
-from conftest import SMALL
+from program import SMALL
 
 COMMANDS = [
     "envs", "train", "record", "mask", "convert", "inspect", "eval", "bench", "reproduce",

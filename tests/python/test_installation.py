@@ -5,7 +5,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import BUILD, ROOT
+from program import BUILD, ROOT
 from safetensors.numpy import load_file
 
 

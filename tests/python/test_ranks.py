@@ -10,7 +10,7 @@ import subprocess
 import time
 
 import pytest
-from conftest import BUILD, SMALL
+from program import BUILD, SMALL
 from test_runs import assert_same_result, progress, train, wait_for_rows
 
 MPIRUN = shutil.which("mpirun")

@@ -5,7 +5,7 @@ import shlex
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from program import ROOT
 
 README = (ROOT / "README.md").read_text()
 

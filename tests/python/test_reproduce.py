@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import BUILD
+from program import BUILD
 from rliable import library, metrics
 
 GRID = [

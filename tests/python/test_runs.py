@@ -11,7 +11,7 @@ import tomllib
 import h5py
 import numpy as np
 import pytest
-from conftest import SMALL
+from program import SMALL
 from safetensors import safe_open
 from safetensors.numpy import load_file
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator

@@ -7,10 +7,10 @@ import time
 import gymnasium
 import numpy as np
 import pytest
-from conftest import Line, train
 from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
+from small import Line, train
 
 import agail
 from agail import _core

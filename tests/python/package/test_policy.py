@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import gymnasium
 import numpy as np
 import pytest
-from conftest import train
+from small import train
 
 import agail
 

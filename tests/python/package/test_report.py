@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from conftest import train
+from small import train
 
 from agail.statistics import bootstrap_interval, iqm
 

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import SMALL, train
+from small import SMALL, train
 
 import agail
 
