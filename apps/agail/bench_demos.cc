@@ -36,10 +36,10 @@ void resize(Demonstrations& demos, Index transitions) {
   const Vector<double> noise = kNoise * deviations(demos);
   const std::vector<DemoEpisode> recorded = std::move(demos.episodes);
   demos.episodes.clear();
-  RandomStream random(0, Purpose::kDiagnostics);
   Index left = transitions;
   for (std::size_t i = 0; left > 0; ++i) {
     DemoEpisode episode = recorded[i % recorded.size()];
+    RandomStream random(0, Purpose::kDiagnostics, 0, static_cast<std::uint32_t>(i));
     if (i >= recorded.size())
       for (Index t = 0; t < episode.observations.rows(); ++t)
         for (Index k = 0; k < episode.observations.cols(); ++k)
