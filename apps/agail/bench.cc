@@ -6,9 +6,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <span>
 
-#include "agail/base/crc32c.h"
 #include "agail/comm/collectives.h"
 #include "agail/comm/together.h"
 #include "agail/config/resolve.h"
@@ -109,14 +107,6 @@ Measured alternate(const Options& options, Trainer& trainer) {
   return sums;
 }
 
-std::string signature_of(const SavedPolicy& policy) {
-  const auto* theta = reinterpret_cast<const std::uint8_t*>(policy.theta().data());
-  const std::span bytes(theta, static_cast<std::size_t>(policy.theta().size()) * sizeof(float));
-  char text[16];
-  std::snprintf(text, sizeof text, "%08x", crc32c(bytes));
-  return text;
-}
-
 ordered_json measure(const Options& options, Trainer& trainer) {
   Communicator& communicator = trainer.team().communicator();
   const Measured sums = alternate(options, trainer);
@@ -142,7 +132,7 @@ ordered_json measure(const Options& options, Trainer& trainer) {
                          {"gflops", gflops},
                          {"peak_gflops", 1e-9 * peak_flops_per_second()},
                          {"peak_memory_bytes", peak_memory_bytes()},
-                         {"signature", signature_of(policy)}};
+                         {"signature", policy.signature()}};
   if (trainer.demonstrations())
     result["demonstration_transitions"] = trainer.demonstrations()->transitions;
   if (communicator.ranks() == 1) return result;

@@ -35,6 +35,8 @@ StepTable read_table(const std::string& path) {
 }
 
 void run(const Options& options) {
+  if (options.environment.empty())
+    throw InputError("--env is empty; give the environment's Gymnasium id, for example Hopper-v5");
   const Demonstrations demonstrations =
       demonstrations_of(read_table(options.input), options.environment);
   write_demonstrations(demonstrations, options.output);

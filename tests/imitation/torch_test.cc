@@ -1,7 +1,6 @@
 // Gradients against PyTorch's autograd, on the numbers that tests/tools/torch_reference.py wrote.
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -15,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 json fixture() {
-  std::ifstream file(std::filesystem::path(__FILE__).parent_path() / "torch_reference.json");
+  std::ifstream file(AGAIL_TORCH_REFERENCE);
   return json::parse(file);
 }
 

@@ -186,7 +186,7 @@ void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Inde
 // Few rows do not fill a packet: the products of a network's last layer, of which there are several
 // for each of the others.
 
-// Dot products of R rows, which lie `kRowStep` apart, with N columns of b, packets q to q + packets
+// Dot products of R rows, which lie `row_step` apart, with N columns of b, packets q to q + packets
 // of all; `start(q)` is where packet q begins in a column.
 template <class S, int R, int N, class Start>
 [[gnu::always_inline]] inline void dots(const S* rows, Index row_step, Right<S> b, Index packets,

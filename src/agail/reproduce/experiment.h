@@ -50,7 +50,7 @@ inline constexpr std::int64_t kEvaluationEpisodes = 50;
 inline constexpr std::uint64_t kEvaluationSeed = 1000;
 
 // While training: about this many evaluations, of the preset's number of episodes.
-inline constexpr std::int64_t kEvaluationsOfARun = 50;
+inline constexpr std::int64_t kEvaluationsOfARun = 25;
 
 struct DemonstrationChoice {
   std::int64_t episodes = 10;

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "agail/base/atomic_file.h"
-#include "agail/base/crc32c.h"
 #include "agail/config/resolve.h"
 #include "agail/config/setting.h"
 #include "agail/train/csv_log.h"
@@ -43,16 +41,6 @@ ordered_json changed_settings(const Settings& settings) {
     if (to_toml(setting.get(settings)) != to_toml(setting.get(start)))
       result[setting.name] = to_toml(setting.get(settings));
   return result;
-}
-
-// Of the parameters, as agail bench prints it.
-std::string signature(const fs::path& policy_file_name) {
-  const SavedPolicy policy = SavedPolicy::load(policy_file_name);
-  const auto* theta = reinterpret_cast<const std::uint8_t*>(policy.theta().data());
-  char text[16];
-  std::snprintf(text, sizeof text, "%08x",
-                crc32c({theta, static_cast<std::size_t>(policy.theta().size()) * sizeof(float)}));
-  return text;
 }
 
 FinalEvaluation evaluate_finally(const fs::path& run_folder) {
@@ -142,7 +130,7 @@ void write_run_record(const fs::path& file, const fs::path& run_folder, const Gr
       {"budget", settings.run.timesteps},
       {"timesteps", summary.at("timesteps")}};
   if (summary.contains("demonstrations")) record["demonstrations"] = summary["demonstrations"];
-  record["signature"] = signature(run_folder / "policy.safetensors");
+  record["signature"] = SavedPolicy::load(run_folder / "policy.safetensors").signature();
   record["final_evaluation"] = to_json(evaluate_finally(run_folder));
   record["evaluations"] = evaluations(run_folder, summary);
   record["training"] = training(curve);
@@ -157,7 +145,7 @@ void write_expert_record(const fs::path& file, const fs::path& run_folder,
                                      {"preset", kExpertPreset},
                                      {"seed", seed},
                                      {"timesteps", summary.at("timesteps")},
-                                     {"signature", signature(policy_file(run_folder))},
+                                     {"signature", SavedPolicy::load(policy_file(run_folder)).signature()},
                                      {"final_evaluation", to_json(evaluate_finally(run_folder))},
                                      {"evaluations", evaluations(run_folder, summary)}}));
 }

@@ -1,10 +1,12 @@
 #include "agail/train/saved_policy.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "agail/base/atomic_file.h"
+#include "agail/base/crc32c.h"
 #include "agail/demos/demonstrations.h"
 #include "agail/rl/rollout.h"
 #include "agail/train/safetensors.h"
@@ -119,6 +121,14 @@ TensorStore SavedPolicy::store() const {
   if (info_.demonstrations_mean_return)
     store.metadata["demonstrations_mean_return"] = json(*info_.demonstrations_mean_return).dump();
   return store;
+}
+
+std::string SavedPolicy::signature() const {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(theta_.data());
+  char text[16];
+  std::snprintf(text, sizeof text, "%08x",
+                crc32c({bytes, static_cast<std::size_t>(theta_.size()) * sizeof(float)}));
+  return text;
 }
 
 std::vector<std::uint8_t> SavedPolicy::encode() const { return to_safetensors(store()); }

@@ -47,6 +47,8 @@ class SavedPolicy {
   const Sizes& hidden() const { return hidden_; }
   const PolicyNetwork<float>& network() const { return network_; }
   const Vector<float>& theta() const { return theta_; }
+  // CRC-32C of the parameters in 8 hex digits: equal runs have equal ones.
+  std::string signature() const;
 
   // Space for one caller; policies are shared between threads, these are not.
   struct Workspace {
