@@ -1,6 +1,7 @@
 #include "agail/reproduce/grid.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
 
 #include "agail/base/atomic_file.h"
@@ -78,25 +79,36 @@ class GridBuilder {
     return arguments;
   }
 
+  // Trains in runs/<id> of a folder; then `write_record` leaves `record`.
+  static Job training_job(
+      const fs::path& folder, const std::string& id, std::string title,
+      const std::string& environment, const Settings& settings, std::vector<std::string> arguments,
+      std::function<void(const fs::path& record, const fs::path& run)> write_record) {
+    const fs::path run = folder / "runs" / id, record = folder / "records" / (id + ".json");
+    return {.title = std::move(title),
+            .result = record,
+            .lock = folder / "locks" / id,
+            .log = folder / "logs" / (id + ".log"),
+            .needs = {},
+            .steps = {[=] { return execute_ourselves(arguments); },
+                      [=] {
+                        write_record(record, run);
+                        return 0;
+                      }},
+            .cost = seconds(environment, settings),
+            .progress = run / "progress.csv",
+            .timesteps = static_cast<double>(settings.run.timesteps)};
+  }
+
   void add_expert(const std::string& environment, std::uint64_t seed) {
     const std::string id = environment + "-" + std::to_string(seed);
     const Settings settings = experiment_.expert_settings(environment);
-    const fs::path run = experts_ / "runs" / id, record = experts_ / "records" / (id + ".json");
-    const auto arguments = train(environment, "trpo", kExpertPreset, seed, settings, run);
-    expert_jobs_[environment].push_back(
-        add({.title = environment + " expert seed " + std::to_string(seed),
-             .result = record,
-             .lock = experts_ / "locks" / id,
-             .log = experts_ / "logs" / (id + ".log"),
-             .needs = {},
-             .steps = {[=] { return execute_ourselves(arguments); },
-                       [=] {
-                         write_expert_record(record, run, environment, seed);
-                         return 0;
-                       }},
-             .cost = seconds(environment, settings),
-             .progress = run / "progress.csv",
-             .timesteps = static_cast<double>(settings.run.timesteps)}));
+    expert_jobs_[environment].push_back(add(training_job(
+        experts_, id, environment + " expert seed " + std::to_string(seed), environment, settings,
+        train(environment, "trpo", kExpertPreset, seed, settings, experts_ / "runs" / id),
+        [=](const fs::path& record, const fs::path& run) {
+          write_expert_record(record, run, environment, seed);
+        })));
   }
 
   void add_demonstrations(const std::string& environment) {
@@ -129,10 +141,9 @@ class GridBuilder {
   void add_run(const GridRun& run) {
     const std::string& environment = run.cell.environment;
     const Settings settings = experiment_.settings(environment);
-    const fs::path folder = out_ / "runs" / run.id(),
-                   record = out_ / "records" / (run.id() + ".json");
-    std::vector<std::string> arguments = train(environment, run.cell.method, experiment_.preset,
-                                               run.seed, settings, folder, experiment_.assignments);
+    std::vector<std::string> arguments =
+        train(environment, run.cell.method, experiment_.preset, run.seed, settings,
+              out_ / "runs" / run.id(), experiment_.assignments);
     std::vector<std::size_t> needs;
     if (run.cell.missing) {
       const fs::path demos = out_ / "demonstrations" / environment;
@@ -140,21 +151,13 @@ class GridBuilder {
                        {"--demos", demonstrations_file(demos, *run.cell.missing).string()});
       needs = {demonstration_jobs_[environment]};
     }
-    const Experiment experiment = experiment_;
-    add({.title = run.title(),
-         .result = record,
-         .lock = out_ / "locks" / run.id(),
-         .log = out_ / "logs" / (run.id() + ".log"),
-         .needs = needs,
-         .steps = {[=] { return execute_ourselves(arguments); },
-                   [=] {
-                     write_run_record(record, folder, run, experiment);
-                     return 0;
-                   }},
-         .cost = seconds(environment, settings),
-         .progress = folder / "progress.csv",
-         .timesteps = static_cast<double>(settings.run.timesteps)},
-        run.cell);
+    Job job = training_job(
+        out_, run.id(), run.title(), environment, settings, arguments,
+        [run, experiment = experiment_](const fs::path& record, const fs::path& folder) {
+          write_run_record(record, folder, run, experiment);
+        });
+    job.needs = needs;
+    add(std::move(job), run.cell);
   }
 
   const Experiment& experiment_;

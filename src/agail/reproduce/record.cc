@@ -140,14 +140,15 @@ void write_run_record(const fs::path& file, const fs::path& run_folder, const Gr
 void write_expert_record(const fs::path& file, const fs::path& run_folder,
                          const std::string& environment, std::uint64_t seed) {
   const ordered_json summary = read_json(run_folder / "summary.json");
-  write_file_atomically(file, lines({{"environment", environment},
-                                     {"method", "trpo"},
-                                     {"preset", kExpertPreset},
-                                     {"seed", seed},
-                                     {"timesteps", summary.at("timesteps")},
-                                     {"signature", SavedPolicy::load(policy_file(run_folder)).signature()},
-                                     {"final_evaluation", to_json(evaluate_finally(run_folder))},
-                                     {"evaluations", evaluations(run_folder, summary)}}));
+  write_file_atomically(
+      file, lines({{"environment", environment},
+                   {"method", "trpo"},
+                   {"preset", kExpertPreset},
+                   {"seed", seed},
+                   {"timesteps", summary.at("timesteps")},
+                   {"signature", SavedPolicy::load(policy_file(run_folder)).signature()},
+                   {"final_evaluation", to_json(evaluate_finally(run_folder))},
+                   {"evaluations", evaluations(run_folder, summary)}}));
 }
 
 void write_demonstrations_record(const fs::path& file, const std::vector<ExpertRecord>& candidates,
