@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+"""AGAIL with 75 % of the actions missing, one part off at a time, on the environments of the paper's Table 1.
+
+    benchmarks/ablation.py                    everything: 4 environments, 4 parts, 6 seeds, beside the full method
+    benchmarks/ablation.py --envs CartPole-v0 --seeds 0 1 2
+    benchmarks/ablation.py --only-tables      from what has been run
+
+Each part is a grid of `agail reproduce table1` in WORK/<part> (default runs/ablation) and goes on where it was stopped. The
+full method is the same cell of the experiment itself: FULL (default results/table1/default), with its experts in EXPERTS
+(default FULL/experts), which are made again if they are not there. Leaves what the runs said in results/table1/ablation:
+<part>/records, table.csv (the columns of `agail reproduce`, after the part that was off) and table.md.
+"""
+
+import argparse
+import csv
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+AGAIL = Path(os.environ.get("AGAIL", ROOT / "build/release/agail"))
+RESULTS = ROOT / "results/table1/ablation"
+MISSING = "0.75"
+OFF = {
+    "discriminator": "reward.alpha=0",
+    "guide": "reward.beta=0",
+    "warm-start": "start.method=random",
+    "cloning-term": "clone.weight=0",
+}
+FULL = "none"
+
+
+def run(part: str, setting: str, options: argparse.Namespace) -> None:
+    command = [AGAIL, "reproduce", "table1", "--out", options.work / part]
+    command += ["--experts", options.experts or options.full / "experts"]
+    command += ["--methods", "agail", "--missing", MISSING, "--set", setting]
+    if options.envs:
+        command += ["--envs", *options.envs]
+    if options.seeds:
+        command += ["--seeds", *map(str, options.seeds)]
+    if options.jobs:
+        command += ["--jobs", str(options.jobs)]
+    print(f"without {part}", flush=True)
+    done = subprocess.run(command, check=False)
+    if done.returncode != 0:
+        sys.exit(done.returncode)
+
+
+def publish(part: str, folder: Path) -> list[dict]:
+    """Keeps the records of a part; its rows of the table."""
+    records = RESULTS / part / "records"
+    shutil.copytree(folder / "records", records, dirs_exist_ok=True)
+    shutil.copy(folder / "experiment.json", RESULTS / part)
+    return rows(part, folder)
+
+
+def rows(part: str, folder: Path) -> list[dict]:
+    with (folder / "table.csv").open() as file:
+        return [
+            {"off": part, **row}
+            for row in csv.DictReader(file)
+            if row["method"] == "agail" and float(row["missing"]) == float(MISSING)
+        ]
+
+
+def markdown(table: list[dict]) -> str:
+    lines = [
+        "| environment | off | training return | deterministic IQM [95 %] | worst seed | of the expert | steps to 95 % |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in table:
+        steps = f"{float(row['steps_to_95']):,.0f}" if row["steps_to_95"] else "never"
+        lines.append(
+            f"| {row['environment']} | {row['off'].replace('-', ' ')} "
+            f"| {float(row['mean']):.1f} ± {float(row['standard_error']):.1f} "
+            f"| {float(row['iqm']):.1f} [{float(row['iqm_low']):.1f}, {float(row['iqm_high']):.1f}] "
+            f"| {float(row['worst_seed']):.1f} | {float(row['share_of_expert']):.1%} | {steps} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--work", type=Path, default=ROOT / "runs/ablation")
+    parser.add_argument("--full", type=Path, default=ROOT / "results/table1/default")
+    parser.add_argument("--experts", type=Path)
+    parser.add_argument("--envs", nargs="+")
+    parser.add_argument("--seeds", nargs="+", type=int)
+    parser.add_argument("--jobs", type=int)
+    parser.add_argument("--only-tables", action="store_true")
+    options = parser.parse_args()
+
+    if not options.only_tables:
+        for part, setting in OFF.items():
+            run(part, setting, options)
+    table = rows(FULL, options.full)
+    for part in OFF:
+        if (options.work / part / "table.csv").exists():
+            table += publish(part, options.work / part)
+    environments = list(dict.fromkeys(row["environment"] for row in table))
+    table.sort(key=lambda row: environments.index(row["environment"]))
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    with (RESULTS / "table.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, table[0].keys(), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
+    (RESULTS / "table.md").write_text(markdown(table))
+    print(markdown(table), end="")
+
+
+if __name__ == "__main__":
+    main()
