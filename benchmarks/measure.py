@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
 """Trains and evaluates what docs/results.md reports, and writes results/<experiment>.csv.
 
-    benchmarks/measure.py trpo         TRPO on the true reward, preset default, seeds 0-4
     benchmarks/measure.py imitation    agail and what it is compared with, 10 demonstrations, 75 % of the actions missing, seeds 0-4
     benchmarks/measure.py ablation     agail with one part off at a time, 10 and 3 demonstrations, seeds 0-4
 
 Runs go to --work (default runs/measure), --jobs at a time with one thread each; finished runs are kept, interrupted
 ones resumed, so the command can be repeated until it is through. Results do not depend on --jobs.
-The experts of `imitation` and `ablation` are the best of the runs of `trpo` (which must be there) that did not fall in any
-of their 50 evaluation episodes.
+Experts are chosen as `agail reproduce` does: TRPO, preset default, the best-evaluated policy of each of seeds 10 to 12; of
+these the one whose worst of 50 deterministic episodes is best.
 """
 
 import argparse
@@ -19,14 +18,14 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from statistics import mean, stdev
+from statistics import mean
 
 ROOT = Path(__file__).resolve().parent.parent
 AGAIL = Path(os.environ.get("AGAIL", ROOT / "build/release/agail"))
 SEEDS = range(5)
 EPISODES = 50
 MISSING = 0.75
-TRPO_ENVIRONMENTS = ["CartPole-v0", "Hopper-v5", "Walker2d-v5", "Humanoid-v4"]
+EXPERT_SEEDS = (10, 11, 12)
 STEPS = {"Hopper-v5": 40_000, "Walker2d-v5": 80_000}
 OFF = {
     "full": [],
@@ -108,44 +107,22 @@ def in_parallel(jobs: int, tasks: list) -> list:
         return list(executor.map(lambda task: task(), tasks))
 
 
-def measure_trpo(work: Path, jobs: int) -> None:
-    def one(environment: str, seed: int) -> dict:
-        run = work / "trpo" / environment / str(seed)
-        train(run, environment, "trpo", seed)
-        result = evaluate(run)
-        summary = json.loads((run / "summary.json").read_text())
-        return {
-            "environment": environment,
-            "seed": seed,
-            "timesteps": summary["timesteps"],
-            "mean_return": round(result["mean_return"], 2),
-            "standard_error": round(result["standard_error"], 2),
-            "mean_length": round(result["mean_length"], 1),
-            "seconds": round(summary["wall_seconds"], 1),
-        }
-
-    # The longest first.
-    tasks = [(e, s) for e in reversed(TRPO_ENVIRONMENTS) for s in SEEDS]
-    rows = in_parallel(jobs, [lambda t=t: one(*t) for t in tasks])
-    rows.sort(key=lambda row: (TRPO_ENVIRONMENTS.index(row["environment"]), row["seed"]))
-    write("trpo", rows)
-    for environment in TRPO_ENVIRONMENTS:
-        returns = [row["mean_return"] for row in rows if row["environment"] == environment]
-        print(
-            f"| {environment} | {mean(returns):.1f} | {stdev(returns):.1f} | {min(returns):.1f} |"
-        )
+def expert(work: Path, environment: str, seed: int) -> Path:
+    run = work / "experts" / environment / str(seed)
+    train(run, environment, "trpo", seed)
+    evaluate(run)
+    return run
 
 
 def demonstrations(work: Path, environment: str, trajectories: int) -> Path:
-    """Of the mean action of the best TRPO run that never fell; three quarters of the actions removed."""
-    runs = [work / "trpo" / environment / str(seed) for seed in SEEDS]
-    runs = [run for run in runs if evaluate(run)["min_length"] == 1000]
-    expert = max(runs, key=lambda run: evaluate(run)["mean_return"])
+    """Of the expert's mean action; three quarters of the actions removed."""
+    runs = [expert(work, environment, seed) for seed in EXPERT_SEEDS]
+    best = max(runs, key=lambda run: (min(evaluate(run)["returns"]), evaluate(run)["mean_return"]))
     masked = work / "demonstrations" / f"{environment}-{trajectories}.hdf5"
     if not masked.exists():
         masked.parent.mkdir(parents=True, exist_ok=True)
         whole = masked.with_name(f"{environment}-{trajectories}-whole.hdf5")
-        agail("record", expert, "--episodes", trajectories, "--out", whole)
+        agail("record", best, "--episodes", trajectories, "--out", whole)
         agail("mask", whole, "--missing", MISSING, "--out", masked)
     return masked
 
@@ -193,6 +170,7 @@ def measure_imitation(
         }
         return head | imitate(run, environment, method, seed, demos, assignments)
 
+    in_parallel(jobs, [lambda e=e, s=s: expert(work, e, s) for e in STEPS for s in EXPERT_SEEDS])
     for environment in STEPS:
         for n in trajectories:
             demonstrations(work, environment, n)
@@ -221,13 +199,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("experiment", choices=["trpo", "imitation", "ablation"])
+    parser.add_argument("experiment", choices=["imitation", "ablation"])
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--work", type=Path, default=ROOT / "runs/measure")
     options = parser.parse_args()
-    if options.experiment == "trpo":
-        measure_trpo(options.work, options.jobs)
-    elif options.experiment == "imitation":
+    if options.experiment == "imitation":
         methods = {
             "agail": ("agail", []),
             "gail": ("gail", []),
