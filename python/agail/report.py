@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import html
 import io
+import textwrap
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sized
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from agail.training import Run
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+RESAMPLES = 50_000  # for the intervals of returns, as rliable
 Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 # Title, the column in progress.csv, and what it is measured in.
@@ -28,20 +30,30 @@ DIAGNOSTICS = (
     ("Discriminator: right about demonstrated states", "discriminator/demo_accuracy", "share"),
     ("Reward of the discriminator", "discriminator/reward", "a step"),
     ("Guide: held-out log-likelihood", "guide/held_out_log_likelihood", "nats"),
+    ("Guide: what the action decides of its reward", "guide/action_variance_share", "share"),
     ("Log-likelihood of the demonstrated actions", "clone/log_likelihood", "nats"),
     ("Step of the policy", "train/kl_divergence_loss", "KL, nats"),
     ("Value network: explained variance", "train/explained_variance", "share"),
 )
 
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #1b1b1f; margin: 0 auto; max-width: 70rem; padding: 1rem; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1b1b1f; background: #fff; margin: 0 auto; max-width: 70rem;
+  padding: 1rem; overflow-wrap: anywhere; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2rem; }
 .wide { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid #d8d8de; padding: .3rem .8rem .3rem 0; text-align: right; white-space: nowrap; }
-th:first-child, td:first-child, .text td { text-align: left; }
+th:first-child, td:first-child, .text th, .text td { text-align: left; }
+td:first-child { white-space: normal; min-width: 12rem; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 26rem), 1fr)); gap: 1rem; }
 figure { margin: 0; } figure svg { width: 100%; height: auto; }
-.broken { color: #a3261d; } footer { color: #6b6b73; margin-top: 2rem; }
+.broken { color: #a3261d; } footer { color: #5c5c64; margin-top: 2rem; }
+@media (max-width: 48rem) { /* a row of a table becomes a block of lines */
+  table, tbody, tr, td { display: block; } tr.head { display: none; }
+  tr { border-bottom: 1px solid #d8d8de; padding: .5rem 0; }
+  td, .text td { border: 0; padding: 0; text-align: left; white-space: normal; }
+  td:first-child { font-weight: 600; }
+  td:not(:first-child)::before { content: attr(data-head) ": "; color: #5c5c64; }
+}
 """
 
 
@@ -140,30 +152,51 @@ def group_runs(runs: list[Run]) -> list[Group]:
     return [Group(name, members) for name, members in sorted(groups.items())]
 
 
+def _count(things: Sized, name: str) -> str:
+    return f"{len(things)} {name}{'s' if len(things) != 1 else ''}"
+
+
 def _figure(title: str, unit: str) -> tuple[Figure, Any]:
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise missing("matplotlib", "report") from error
-    figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+    figure = Figure(
+        figsize=(4.8, 3), layout="constrained"
+    )  # small: letters are read on a telephone
     axes = figure.add_subplot()
-    axes.set_title(title, loc="left", fontsize=11)
+    axes.set_title(title, loc="left", fontsize=10)
     axes.set_ylabel(unit)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(alpha=0.25)
+    axes.margins(y=0.12)
     return figure, axes
 
 
-def _draw_curves(axes: Any, curves: list[Curve], label: str, color: str) -> None:
+def _add_legend(figure: Figure, axes: Any) -> None:
+    """Below the axes, which keep their height."""
+    lines, labels = axes.get_legend_handles_labels()
+    labels = [textwrap.fill(label, 60) for label in labels]
+    height = sum(1 + label.count("\n") for label in labels)
+    figure.set_figheight(3 + 0.2 * height)
+    figure.legend(lines, labels, loc="outside lower left", fontsize=9, frameon=False)
+
+
+def _look(i: int) -> dict[str, Any]:
+    """Of the i-th line: colours first, then dashes."""
+    return {"color": f"C{i % 10}", "linestyle": ("-", "--", ":", "-.")[i // 10 % 4]}
+
+
+def _draw_curves(axes: Any, curves: list[Curve], label: str, look: dict[str, Any]) -> None:
     """Mean over the seeds, 95 % interval around it; on the steps that all have reached."""
     end = min(steps[-1] for steps, _ in curves)
     grid = np.unique(np.concatenate([steps[steps <= end] for steps, _ in curves]))
     values = np.array([np.interp(grid, steps, column) for steps, column in curves])
     marker = "o" if len(grid) == 1 else None
-    axes.plot(grid, values.mean(0), label=label, color=color, marker=marker, linewidth=1.5)
+    axes.plot(grid, values.mean(0), label=label, marker=marker, linewidth=1.5, **look)
     if len(values) > 1:
         low, high = bootstrap_interval(values, np.mean)
-        axes.fill_between(grid, low, high, color=color, alpha=0.2, linewidth=0)
+        axes.fill_between(grid, low, high, color=look["color"], alpha=0.2, linewidth=0)
 
 
 def curves_figure(groups: list[Group], title: str, column: str, unit: str) -> Figure | None:
@@ -174,14 +207,22 @@ def curves_figure(groups: list[Group], title: str, column: str, unit: str) -> Fi
         return None
     figure, axes = _figure(title, unit)
     for i, (group, curves) in enumerate(drawn):
-        _draw_curves(axes, curves, f"{group.name.split(': ', 1)[1]} ({len(curves)})", f"C{i % 10}")
+        name = group.name.split(": ", 1)[1]
+        _draw_curves(axes, curves, f"{name} ({_count(curves, 'run')})", _look(i))
     if column == "eval/mean_reward":
         for value in sorted({group.reference() for group, _ in drawn} - {None}):
             axes.axhline(value, color="0.4", linestyle=":", linewidth=1)
             axes.annotate("demonstrations", (0.01, value), xycoords=("axes fraction", "data"),
-                          va="bottom", fontsize=8, color="0.4")  # fmt: skip
+                          va="bottom", fontsize=9, color="0.35")  # fmt: skip
+    from matplotlib.ticker import EngFormatter
+
     axes.set_xlabel("environment steps")
-    axes.legend(fontsize=8, frameon=False)
+    axes.set_xlim(left=0)
+    axes.xaxis.set_major_formatter(EngFormatter(sep=""))
+    if column.endswith("_accuracy"):
+        axes.set_ylim(0, 1)
+        axes.axhline(0.5, color="0.4", linestyle=":", linewidth=1)  # cannot tell
+    _add_legend(figure, axes)
     return figure
 
 
@@ -194,24 +235,31 @@ def ratio_figure(groups: list[Group]) -> Figure | None:
             lines[method].append((group.missing_ratio(), group.final_returns()))
     if len({ratio for points in lines.values() for ratio, _ in points}) < 2:
         return None
-    figure, axes = _figure("Return against the share of missing actions", "return")
+    figure, axes = _figure(
+        f"{groups[0].name.split(': ')[0]}: return over missing actions", "return (IQM)"
+    )
     for i, (method, points) in enumerate(sorted(lines.items())):
         points.sort()
         ratios = [ratio for ratio, _ in points]
         middle = [iqm(np.array(returns)) for _, returns in points]
-        axes.plot(ratios, middle, marker="o", color=f"C{i}", label=method)
+        look = _look(i)
+        axes.plot(ratios, middle, marker="o", label=method, **look)
         for ratio, returns in points:
-            low, high = bootstrap_interval(np.array(returns)[:, None], iqm)
-            axes.plot([ratio, ratio], [low[0], high[0]], color=f"C{i}", alpha=0.6)
+            low, high = bootstrap_interval(np.array(returns)[:, None], iqm, RESAMPLES)
+            axes.plot([ratio, ratio], [low[0], high[0]], color=look["color"], alpha=0.6)
     axes.set_xlabel("share of the actions that is missing")
-    axes.legend(fontsize=8, frameon=False)
+    _add_legend(figure, axes)
     return figure
 
 
 def _table(head: list[str], rows: list[list[str]], kind: str = "") -> str:
-    cells = lambda tag, row: "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row)  # noqa: E731
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f'<div class="wide {kind}"><table><tr>{cells("th", head)}</tr>{body}</table></div>'
+    names = [html.escape(name) for name in head]
+    lines = ["".join(f"<th>{name}</th>" for name in names)]
+    for row in rows:
+        cells = zip(names, map(html.escape, row))
+        lines.append("".join(f'<td data-head="{name}">{cell}</td>' for name, cell in cells))
+    body = "</tr><tr>".join(lines)
+    return f'<div class="wide {kind}"><table><tr class="head">{body}</tr></table></div>'
 
 
 def results_table(groups: list[Group]) -> str:
@@ -222,12 +270,19 @@ def results_table(groups: list[Group]) -> str:
         if len(returns) == 0:
             rows.append([*row, *["-"] * 4])
             continue
-        low, high = bootstrap_interval(returns[:, None], iqm)
+        low, high = bootstrap_interval(returns[:, None], iqm, RESAMPLES)
         interval = f"{low[0]:,.1f} to {high[0]:,.1f}" if len(returns) > 1 else "-"
         reference = group.reference()
         share = f"{100 * returns.mean() / reference:.1f} %" if reference else "-"
         rows.append([*row, f"{iqm(returns):,.1f}", interval, f"{returns.min():,.1f}", share])
-    head = ["", "finished", "IQM of the return", "95 % interval", "worst", "of the demonstrations"]
+    head = [
+        "runs",
+        "finished",
+        "IQM of the return",
+        "95 % interval",
+        "worst",
+        "of the demonstrations",
+    ]
     return _table(head, rows)
 
 
@@ -262,7 +317,7 @@ def page(runs: list[Run], broken: list[tuple[Path, str]], figures: dict[str, Fig
 
     matplotlib.rcParams["svg.hashsalt"] = "agail"  # equal runs, equal bytes
     groups = group_runs(runs)
-    parts = [f"<h1>{len(runs)} run{'s' if len(runs) != 1 else ''}</h1>"]
+    parts = [f"<h1>{_count(runs, 'run')}</h1>"]
     if groups:
         parts.append(results_table(groups))
     for path, reason in broken:
@@ -287,8 +342,8 @@ def page(runs: list[Run], broken: list[tuple[Path, str]], figures: dict[str, Fig
     return (
         '<!doctype html><html lang="en"><meta charset="utf-8"><title>agail: runs</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{STYLE}</style><body>{body}<footer>IQM: mean of the middle half of the seeds. "
-        "Intervals: 95 %, bootstrap over seeds.</footer></body></html>\n"
+        f"<style>{STYLE}</style><body>{body}<footer>IQM: mean without the lowest and the highest quarter "
+        "of the seeds. Curves: mean. Intervals: 95 %, bootstrap over seeds.</footer></body></html>\n"
     )
 
 
@@ -312,6 +367,6 @@ def main() -> None:
                     figure.savefig(Path(options.figures) / f"{name}.png", dpi=150)
         except OSError as error:
             raise InputError(f"{error.filename}: cannot be written ({error.strerror})") from error
-        print(f"{options.out}: {len(runs)} runs, {len(figures)} figures")
+        print(f"{options.out}: {_count(runs, 'run')}, {_count(figures, 'figure')}")
 
     run(work)

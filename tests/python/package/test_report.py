@@ -18,12 +18,23 @@ def report(*words, **options):
     return subprocess.run(words, capture_output=True, text=True, timeout=300, **options)
 
 
-def test_iqm():
-    assert iqm(np.arange(8.0)) == 3.5
-    assert iqm(np.array([0, 1, 2, 100.0])) == 1.5
-    assert iqm(np.array([7.0])) == 7
-    # Three values: the outer ones count a quarter of the middle one.
-    assert iqm(np.array([0, 1, 8.0])) == pytest.approx((0.25 * 0 + 1 + 0.25 * 8) / 1.5)
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6, 10, 23])
+def test_statistics_are_rliables(count):
+    import rliable.library
+    import rliable.metrics
+
+    scores = np.random.default_rng(count).gamma(2, 100, size=(count, 1))
+    mine = iqm(scores)[0]
+    assert mine == pytest.approx(rliable.metrics.aggregate_iqm(scores), rel=1e-12)
+    if count == 1:
+        return
+    points, intervals = rliable.library.get_interval_estimates(
+        {"x": scores}, lambda each: np.array([rliable.metrics.aggregate_iqm(each)]), reps=4000
+    )
+    low, high = bootstrap_interval(scores, iqm, 20_000)
+    assert points["x"][0] == pytest.approx(mine)
+    assert low[0] <= mine <= high[0]
+    np.testing.assert_allclose([low[0], high[0]], intervals["x"][:, 0], atol=0.06 * scores.std())
 
 
 def test_bootstrap_interval():
@@ -67,7 +78,7 @@ def test_one_run_and_broken_ones(runs, tmp_path):
     (tmp_path / "broken" / "config.toml").write_text("[run")
     words = [runs / "state", tmp_path / "empty", tmp_path / "broken"]
     done = report(*words, "--out", tmp_path / "r.html")
-    assert done.returncode == 0 and "1 runs" in done.stdout, done.stderr
+    assert done.returncode == 0 and "1 run," in done.stdout, done.stderr
     text = (tmp_path / "r.html").read_text()
     assert "empty: there is no run in this folder" in text and "broken: " in text
 
