@@ -49,7 +49,7 @@ int run(int argc, char** argv, agail::Communicator& communicator) {
       const std::string name = argv[1];
       std::string advice = "did you mean '" + agail::nearest(name, names) + "'?";
       if (name == "export" || name == "report" || name == "video")
-        advice = "it comes with the Python package of agail";
+        advice = "it comes with agail's Python package: pip install . in the source folder";
       throw agail::InputError("no command 'agail " + name + "', and no program agail-" + name +
                               " on the PATH; " + advice);
     }

@@ -62,7 +62,7 @@ void add_train(CLI::App& app, Communicator& communicator) {
   CLI::App* command = app.add_subcommand("train", "Train a policy");
   const auto options = std::make_shared<Options>();
   command->add_option("ENV", options->environment, "Environment id, see agail envs")->required();
-  command->add_option("--method", options->method, "trpo gail state-gail agail bc bco")->required();
+  command->add_option("--method", options->method, training_method_names())->required();
   command->add_option("--out", options->out, "Run folder to create")->required();
   command->add_option(
       "--demos", options->demos,

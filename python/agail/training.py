@@ -140,7 +140,7 @@ def train(
     environment: an id (built in, or registered with Gymnasium), a gymnasium.Env, a SyncVectorEnv or
     AsyncVectorEnv, or a function that makes an environment.
     demonstrations: a Demonstrations, or what Demonstrations.load() takes; not for method "trpo".
-    method: "agail", "gail", "state-gail", "bc" or "trpo".
+    method: "agail", "gail", "state-gail", "bc", "bco" or "trpo".
     out: the run's folder; without it a temporary one, which goes when the Run does.
     timesteps, lanes: short for the settings run.timesteps and run.lanes.
     preset: "default", "paper" or a .toml file; settings: any setting of docs/settings.md, as
@@ -199,6 +199,30 @@ def _policy(policy: Policy | Run | str | os.PathLike[str]) -> Policy:
     return policy.policy if isinstance(policy, Run) else Policy.load(policy)
 
 
+def _play(
+    work: Callable[..., Any],
+    policy: Policy,
+    episodes: int,
+    environment: EnvironmentLike | None,
+    seed: int,
+    deterministic: bool,
+    threads: int | None,
+) -> Any:
+    """_core.evaluate or _core.record, in environments that are closed afterwards."""
+    name, source = _environment_for(policy, environment)
+    try:
+        return work(
+            policy,
+            _whole("episodes", episodes, 1),
+            _whole("seed", seed, 0),
+            not deterministic,
+            _threads(threads, source, name),
+            source,
+        )
+    finally:
+        source.close()
+
+
 def evaluate(
     policy: Policy | Run | str | os.PathLike[str],
     episodes: int = 50,
@@ -213,18 +237,7 @@ def evaluate(
     environment: as for train(); default: the one that the policy names.
     """
     policy = _policy(policy)
-    name, source = _environment_for(policy, environment)
-    try:
-        result = _core.evaluate(
-            policy,
-            _whole("episodes", episodes, 1),
-            _whole("seed", seed, 0),
-            not deterministic,
-            _threads(threads, source, name),
-            source,
-        )
-    finally:
-        source.close()
+    result = _play(_core.evaluate, policy, episodes, environment, seed, deterministic, threads)
     reference = policy.demonstrations_mean_return
     share = result["mean_return"] / reference if reference else None
     return Evaluation(share_of_demonstrations=share, **result)
@@ -241,18 +254,7 @@ def record(
 ) -> Demonstrations:
     """Complete demonstrations from a policy, as `agail record` makes them."""
     policy = _policy(policy)
-    name, source = _environment_for(policy, environment)
-    try:
-        core = _core.record(
-            policy,
-            _whole("episodes", episodes, 1),
-            _whole("seed", seed, 0),
-            not deterministic,
-            _threads(threads, source, name),
-            source,
-        )
-    finally:
-        source.close()
+    core = _play(_core.record, policy, episodes, environment, seed, deterministic, threads)
     return Demonstrations(core)
 
 

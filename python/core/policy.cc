@@ -197,7 +197,7 @@ void bind_policy(nb::module_& module) {
           "Id of the environment that it was trained for.")
       .def_prop_ro(
           "method", [](const Policy& policy) { return policy.saved().info().method; },
-          "trpo gail state-gail agail bc")
+          "trpo gail state-gail agail bc bco")
       .def_prop_ro(
           "timesteps", [](const Policy& policy) { return policy.saved().info().timesteps; },
           "Environment steps that it learned from.")

@@ -16,11 +16,20 @@ const std::vector<std::string>& training_methods() {
   return methods;
 }
 
+const std::string& training_method_names() {
+  static const std::string names = [] {
+    std::string text;
+    for (const std::string& method : training_methods()) text += (text.empty() ? "" : " ") + method;
+    return text;
+  }();
+  return names;
+}
+
 TrainingTask make_training_task(const TaskRequest& request) {
   const std::vector<std::string>& methods = training_methods();
   if (std::find(methods.begin(), methods.end(), request.method) == methods.end())
     throw InputError("--method " + request.method + ": no such method; did you mean '" +
-                     nearest(request.method, methods) + "'? (trpo gail state-gail agail bc bco)");
+                     nearest(request.method, methods) + "'? (" + training_method_names() + ")");
   environment_spec(request.environment);  // an unknown id is told before anything else
   SettingsSource source{request.preset, request.environment, request.assignments};
   if (request.timesteps > 0)

@@ -8,12 +8,14 @@
 
 namespace agail {
 
-// trpo gail state-gail agail bc bco
+// What --method may be.
 const std::vector<std::string>& training_methods();
+// The same with spaces between them, for help and error messages.
+const std::string& training_method_names();
 
 struct TaskRequest {
   std::string environment;
-  std::string method;
+  std::string method;                    // of training_methods()
   std::string preset = "default";        // a name, or the path of a TOML file
   std::vector<std::string> assignments;  // key=value, for any setting
   std::int64_t timesteps = 0;            // 0: as the settings say

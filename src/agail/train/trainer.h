@@ -21,7 +21,7 @@ namespace agail {
 
 struct TrainingTask {
   std::string environment;
-  std::string method;  // trpo gail state-gail agail bc bco
+  std::string method;  // of training_methods() in task_request.h
   Settings settings;
   std::string settings_toml;
   std::uint64_t seed = 0;
