@@ -141,6 +141,30 @@ def test_tensorboard_agrees_with_progress(imitation):
     assert_tensorboard_agrees(imitation)
 
 
+def test_tensorboard_reads_a_run_under_way(agail, small, tmp_path):
+    """One reader, as a browser that was opened early."""
+    run = tmp_path / "run"
+    process = agail.start(*train(small, "agail", run, 10**8))
+    try:
+        wait_for_rows(process, run, 3)
+        reader = EventAccumulator(str(run), size_guidance={"scalars": 0})
+        for rows in (3, 8, 13):
+            wait_for_rows(process, run, rows + 1)  # the one before is written in full
+            reader.Reload()
+            assert process.poll() is None
+            events = reader.Scalars("rollout/ep_rew_mean")
+            assert len(events) >= rows
+            assert [event.step for event in events] == [256 * (i + 1) for i in range(len(events))]
+            known = [float(row["rollout/ep_rew_mean"]) for row in progress(run)[:rows]]
+            np.testing.assert_array_equal(
+                [event.value for event in events[:rows]], np.float32(known)
+            )
+    finally:
+        process.terminate()
+        process.wait(60)
+    assert_tensorboard_agrees(run)
+
+
 def test_policies_do_not_know_where_they_were_trained(imitation):
     with safe_open(imitation / "policy.safetensors", "numpy") as file:
         metadata = file.metadata()
