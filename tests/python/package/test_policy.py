@@ -1,5 +1,6 @@
 """agail.Policy: actions as stable-baselines3 gives them, and as Gymnasium's environments take them."""
 
+import array
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 
@@ -43,11 +44,22 @@ def test_a_batch_is_its_rows(hopper):
 def test_what_it_takes(hopper):
     row = batch().astype(np.float32)[0]
     expected, _ = hopper.predict(row)
-    for same in (row.tolist(), row.astype(np.float64), row[None], np.stack([row, row], 1)[:, 0]):
+    double = row.astype(np.float64)
+    constant = double.copy()
+    constant.flags.writeable = False
+    strided = np.stack([double, double], 1)[:, 0]
+    kinds = (row.tolist(), double, row[None], np.stack([row, row], 1)[:, 0], strided, constant,
+             double.astype(">f8"), array.array("d", double), np.asfortranarray(double[None]))  # fmt: skip
+    for same in kinds:
         np.testing.assert_array_equal(hopper.predict(same)[0].reshape(3), expected)
     for shape in ((12,), (2, 3, 11), (), (11, 1)):
         with pytest.raises(agail.InputError, match=r"\(11,\) or \(n, 11\)"):
             hopper.predict(np.zeros(shape))
+    rows = np.asfortranarray(batch())
+    np.testing.assert_array_equal(hopper.predict(rows)[0], hopper.predict(batch())[0])
+    for wrong in (b"x" * 88, "text", None):
+        with pytest.raises((ValueError, TypeError)):
+            hopper.predict(wrong)
 
 
 def test_the_formula(hopper, hopper_run):
