@@ -39,7 +39,7 @@ def _choose_gl() -> None:
             return
     raise InputError(
         f"MuJoCo cannot draw without a screen here (MUJOCO_GL={wanted or 'egl and osmesa'}); "
-        "on Debian: apt-get install libegl1 libgl1"
+        "on Debian: apt-get install libegl1 libgl1 libopengl0"
     )
 
 

@@ -233,6 +233,13 @@ def test_extensions(agail, tmp_path, monkeypatch):
     assert done.returncode == 7 and done.stdout == "2 --episodes two words\n"
 
 
+def test_methods_are_told(agail):
+    names = "trpo gail state-gail agail bc bco"
+    told = agail.refused("train", "CartPole-v1", "--method", "bcoo", "--out", "run")
+    assert "'bco'" in told and f"({names})" in told
+    assert names in " ".join(agail("train", "--help").split())
+
+
 def test_no_such_extension(agail, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     assert "agail-hello" in agail.refused("hello")
