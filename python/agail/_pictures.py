@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,14 +85,24 @@ def _write_mp4(part: Path, frames: Iterator[Image.Image], rate: float) -> None:
     except ImportError as error:
         raise missing("imageio-ffmpeg", "video") from error
     first = next(frames)
-    writer = imageio_ffmpeg.write_frames(
-        str(part), first.size, fps=rate, codec="libx264", quality=7, macro_block_size=2
-    )
-    with closing(writer):
-        writer.send(None)
-        writer.send(first.tobytes())
-        for frame in frames:
-            writer.send(frame.tobytes())
+    size = "x".join(map(str, first.size))
+    # Not imageio_ffmpeg.write_frames(), which takes no notice of a full disk at the end.
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error",
+               "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(rate), "-i", "-",
+               "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", part]  # fmt: skip
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
+        try:
+            for frame in itertools.chain([first], frames):
+                ffmpeg.stdin.write(frame.tobytes())
+        except BrokenPipeError:
+            pass  # it says why
+        except BaseException:
+            ffmpeg.kill()
+            raise
+        _, said = ffmpeg.communicate()
+    if ffmpeg.returncode != 0:
+        reason = " ".join(said.decode(errors="replace").split()) or f"code {ffmpeg.returncode}"
+        raise OSError(f"{part}: ffmpeg could not write it: {reason}")
 
 
 def _write_gif(part: Path, frames: Iterator[Image.Image], rate: float) -> None:

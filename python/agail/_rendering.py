@@ -51,7 +51,6 @@ def make_drawn(name: str, size: tuple[int, int] | None) -> gymnasium.Env:
     """
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # of pygame
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    gymnasium.logger.min_level = gymnasium.logger.ERROR  # older versions are meant
     module, _, name = name.rpartition(":")
     if name.startswith("agail/") and name[6:] in _core.environment_ids():
         name = name[6:]

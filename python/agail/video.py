@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import gymnasium
+
 from agail._core import InputError, Policy
 from agail._extension import Parser, run
 from agail._pictures import FORMATS, possible_rate, write_film
@@ -122,6 +124,7 @@ def main() -> None:
     options = parser.parse_args()
 
     def work() -> None:
+        gymnasium.logger.min_level = gymnasium.logger.ERROR  # if the version is old, it is meant
         _check(options)
         size = _size(options.size) if options.size else None
         policy = Policy.load(options.policy)

@@ -2,6 +2,7 @@
 
 import math
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -19,12 +20,17 @@ from agail._pictures import captioned
 from agail._rendering import Placer
 from agail.video import HOLD
 
+AGAIL = str(Path(sys.executable).with_name("agail"))
 
-def video(*words, **environment):
-    words = [str(Path(sys.executable).with_name("agail")), "video", *map(str, words)]
+
+def video(*words, largest_file=resource.RLIM_INFINITY, **environment):
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, resource.RLIM_INFINITY))
+
     return subprocess.run(
-        words, capture_output=True, text=True, timeout=300, env={**os.environ, **environment}
-    )
+        [AGAIL, "video", *map(str, words)], capture_output=True, text=True, timeout=300,
+        env={**os.environ, **environment}, preexec_fn=limit,
+    )  # fmt: skip
 
 
 def decode(path):
@@ -197,6 +203,17 @@ def test_no_policy(tmp_path):
     done = video(tmp_path, "--out", tmp_path / "x.mp4")
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
     assert video(tmp_path).returncode == 2  # no --out
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_no_space(tmp_path, suffix):
+    """Half a film is none; the one that was there stays."""
+    run = train("CartPole-v1", method="trpo", timesteps=256)
+    out = tmp_path / f"x{suffix}"
+    out.write_text("the last one")
+    done = video(run.folder, "--out", out, largest_file=4096)
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done
+    assert list(tmp_path.iterdir()) == [out] and out.read_text() == "the last one"
 
 
 def test_no_opengl(hopper_run, tmp_path):
