@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import os
 import subprocess
 import sys
+import tempfile
 from typing import Any
 
 import gymnasium
@@ -31,9 +32,10 @@ def _choose_gl() -> None:
     wanted = os.environ.get("MUJOCO_GL")
     for name in [wanted] if wanted else ["egl", "osmesa"]:
         environment = {**os.environ, "MUJOCO_GL": name}
-        tried = subprocess.run(
-            [sys.executable, "-c", _TRY_GL], env=environment, capture_output=True, check=False
-        )
+        with tempfile.TemporaryDirectory() as log:  # MuJoCo leaves MUJOCO_LOG.TXT where it fails
+            tried = subprocess.run(
+                [sys.executable, "-c", _TRY_GL], env=environment, cwd=log, capture_output=True
+            )
         if tried.returncode == 0:
             os.environ["MUJOCO_GL"] = name
             return
@@ -63,8 +65,12 @@ def make_drawn(name: str, size: tuple[int, int] | None) -> gymnasium.Env:
         raise InputError(f"environment {name}: {reason}; --env names one of Gymnasium's") from error
     options: dict[str, Any] = {}
     if str(spec.entry_point).startswith(_MUJOCO):
-        if importlib.util.find_spec("mujoco") is None:
-            raise missing("mujoco", "video")
+        try:
+            import mujoco
+        except ImportError as error:
+            raise missing("mujoco", "video") from error
+        # Of Gymnasium's models. MuJoCo would write them to MUJOCO_LOG.TXT in the present folder.
+        mujoco.set_mju_user_warning(lambda message: None)
         _choose_gl()
         options = dict(zip(("width", "height"), size)) if size else {}
         options["camera_name"] = "track"  # follows the robot, if the model has it

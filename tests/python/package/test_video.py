@@ -99,8 +99,10 @@ def test_an_episode(hopper_run, tmp_path, suffix):
 
 
 @pytest.mark.parametrize("name", ["Hopper-v5", "Humanoid-v5", "CartPole-v0"])
-def test_beside_demonstrations(tmp_path, name):
+def test_beside_demonstrations(tmp_path, monkeypatch, name):
     """The policy that made the demonstrations does the same again, from the same first states."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
     run = train(name, method="trpo", out=tmp_path / "run", timesteps=256)
     demos = agail.record(run, 2, seed=5)
     demos.save(tmp_path / "demos.hdf5")
@@ -116,10 +118,12 @@ def test_beside_demonstrations(tmp_path, name):
     apart = np.abs(left - right).mean()
     moved = np.abs(left[0] - left[len(left) // 3]).mean()
     assert apart < 2 and moved > 1 and apart < moved / 2
+    assert not list((tmp_path / "here").iterdir()), "MuJoCo's log"
 
 
 @pytest.mark.parametrize("name", _core.environment_ids())
-def test_states_from_observations(name):
+def test_states_from_observations(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # for MuJoCo's log
     original, copy = gymnasium.make(name), gymnasium.make(name)
     observation, _ = original.reset(seed=1)
     original.action_space.seed(1)
