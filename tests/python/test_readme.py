@@ -50,7 +50,7 @@ def test_links_lead_somewhere():
 
 
 def test_commands_are_those_of_the_program(agail):
-    extensions = {"export", "report"}  # of the Python package
+    extensions = {"export", "report", "video"}  # of the Python package
     names = {line.split()[1] for line in commands("Commands")} - extensions
     shown = agail("--help")
     assert all(re.search(rf"^\s+{name}\s", shown, re.MULTILINE) for name in names)
