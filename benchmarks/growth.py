@@ -15,7 +15,6 @@ one round of small sizes, to see that everything works. Leave the machine alone 
 
 import argparse
 import csv
-import hashlib
 import json
 import math
 import os
@@ -28,8 +27,8 @@ from datetime import date
 from pathlib import Path
 from statistics import median
 
-ROOT = Path(__file__).resolve().parent.parent
-AGAIL = os.environ.get("AGAIL", str(ROOT / "build/release/agail"))
+from machine import AGAIL, ROOT, Kept, cpu_model
+
 PAGE = ROOT / "docs/performance.md"
 COLUMNS = ["part", "variant", "x", "size", "stepping_us", "training_us", "learning_us"]
 COLUMNS += ["guide_us", "peak_memory_mb", "seconds"]
@@ -37,19 +36,13 @@ COLUMNS += ["guide_us", "peak_memory_mb", "seconds"]
 
 class Growth:
     def __init__(self, work: Path, rounds: int, quick: bool):
-        work.mkdir(parents=True, exist_ok=True)
         self.work, self.rounds, self.quick = work, rounds, quick
-        build = hashlib.sha256(Path(AGAIL).read_bytes()).hexdigest()[:12]
-        self.path = work / f"measurements-{build}{'-quick' if quick else ''}.json"
-        self.kept = json.loads(self.path.read_text()) if self.path.exists() else {}
+        self.kept = Kept(work, quick)
 
     def keep(self, key: str, measure) -> dict:
         if key not in self.kept:
-            self.kept[key] = measure()
+            self.kept.put(key, measure())
             print(f"{key}: {json.dumps(self.kept[key])}", flush=True)
-            partial = self.path.with_suffix(".partial")
-            partial.write_text(json.dumps(self.kept, indent=1))
-            partial.rename(self.path)
         return self.kept[key]
 
     def bench(
@@ -299,13 +292,6 @@ def write_csv(path: Path, rows: list[dict], parts: list[str]) -> None:
         writer.writeheader()
         for row in rows:
             writer.writerow({k: round(v, 3) if isinstance(v, float) else v for k, v in row.items()})
-
-
-def cpu_model() -> str:
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        if line.startswith("model name"):
-            return line.split(":")[1].strip()
-    return platform.processor()
 
 
 def main() -> None:

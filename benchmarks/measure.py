@@ -20,8 +20,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from statistics import mean
 
-ROOT = Path(__file__).resolve().parent.parent
-AGAIL = Path(os.environ.get("AGAIL", ROOT / "build/release/agail"))
+from machine import AGAIL, ROOT
+
 SEEDS = range(5)
 EPISODES = 50
 MISSING = 0.75

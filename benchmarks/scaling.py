@@ -7,15 +7,13 @@ ratio, and refuses if the bits differ. Leave the machine alone meanwhile.
 
 import argparse
 import json
-import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 from statistics import median
 
-ROOT = Path(__file__).resolve().parent.parent
-AGAIL = os.environ.get("AGAIL", str(ROOT / "build/release/agail"))
+from machine import AGAIL
+
 MPIRUN = ["mpirun", "--allow-run-as-root", "--bind-to", "none", "-n", "2"]
 
 

@@ -19,7 +19,6 @@ anew. --quick: once, briefly, to see that everything works. Leave the machine al
 
 import argparse
 import csv
-import hashlib
 import json
 import os
 import platform
@@ -31,8 +30,8 @@ from datetime import date
 from pathlib import Path
 from statistics import median
 
-ROOT = Path(__file__).resolve().parent.parent
-AGAIL = os.environ.get("AGAIL", str(ROOT / "build/release/agail"))
+from machine import AGAIL, ROOT, Kept, cpu_model
+
 PEERS = ROOT / "benchmarks/peers"
 ENVIRONMENTS = ["Hopper-v4", "Humanoid-v4"]
 BATCH = 1024
@@ -215,38 +214,28 @@ def install(work: Path, group: str) -> None:
     stamp.write_text("\n".join(packages))
 
 
-class Measurements:
-    """What was measured, kept in a file."""
-
-    def __init__(self, path: Path):
-        self.path = path
-        self.entries: dict[str, dict] = json.loads(path.read_text()) if path.exists() else {}
-
-    def get(
-        self, environment: str, contender: Contender, way: str, turn: int, length: Length
-    ) -> dict:
-        key = f"{environment} | {contender.name} | {way} | {turn}"
-        if key not in self.entries:
-            try:
-                rate, versions = contender.ways[way](environment, length)
-                self.entries[key] = {"rate": rate, "versions": versions}
-                print(f"{environment}, {contender.name} ({way}): {rate:,.0f} samples/s", flush=True)
-            except PeerFailed as failure:
-                print(f"failed: {failure}", flush=True)
-                return {"rate": 0, "versions": {}}
-            partial = self.path.with_suffix(".partial")
-            partial.write_text(json.dumps(self.entries, indent=1))
-            partial.rename(self.path)
-        return self.entries[key]
+def measured(
+    kept: Kept, environment: str, contender: Contender, way: str, turn: int, length: Length
+) -> dict:
+    key = f"{environment} | {contender.name} | {way} | {turn}"
+    if key not in kept:
+        try:
+            rate, versions = contender.ways[way](environment, length)
+        except PeerFailed as failure:
+            print(f"failed: {failure}", flush=True)
+            return {"rate": 0, "versions": {}}
+        print(f"{environment}, {contender.name} ({way}): {rate:,.0f} samples/s", flush=True)
+        kept.put(key, {"rate": rate, "versions": versions})
+    return kept[key]
 
 
-def choose(kept: Measurements, environment: str, contender: Contender) -> None:
+def choose(kept: Kept, environment: str, contender: Contender) -> None:
     """The quickest way; none if all fail."""
     ways = list(contender.ways)
     if len(ways) == 1:
         contender.chosen[environment] = ways[0]
         return
-    rates = {way: kept.get(environment, contender, way, -1, SHORT)["rate"] for way in ways}
+    rates = {way: measured(kept, environment, contender, way, -1, SHORT)["rate"] for way in ways}
     best = max(ways, key=lambda way: rates[way])
     if rates[best] > 0:
         contender.chosen[environment] = best
@@ -286,13 +275,6 @@ def table_of_ratios(rates: dict[tuple[str, str], list[float]]) -> str:
     return "\n".join(lines)
 
 
-def cpu_model() -> str:
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        if line.startswith("model name"):
-            return line.split(":")[1].strip()
-    return platform.processor()
-
-
 def write(folder: Path, rows: list[dict], text: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "side_by_side.csv").open("w", newline="") as file:
@@ -325,10 +307,7 @@ def main() -> None:
             print(f"failed: {failure}", flush=True)
             everyone = [c for c in everyone if not c.name.startswith(name)]
 
-    # Another build of agail is another measurement.
-    build = hashlib.sha256(Path(AGAIL).read_bytes()).hexdigest()[:12]
-    mode = "-quick" if options.quick else ""
-    kept = Measurements(work / f"measurements-{build}{mode}.json")
+    kept = Kept(work, options.quick)
     rates: dict[tuple[str, str], list[float]] = {}
     versions: dict[str, str] = {}
     rows = []
@@ -339,7 +318,7 @@ def main() -> None:
         for turn in range(repeats):
             for contender in running:
                 way = contender.chosen[environment]
-                entry = kept.get(environment, contender, way, turn, length)
+                entry = measured(kept, environment, contender, way, turn, length)
                 if entry["rate"] == 0:
                     continue
                 rates.setdefault((environment, contender.name), []).append(entry["rate"])

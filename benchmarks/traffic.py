@@ -15,10 +15,9 @@ import math
 import os
 import subprocess
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-AGAIL = Path(os.environ.get("AGAIL", ROOT / "build/release/agail"))
+from machine import AGAIL
+
 CHUNK = 64
 
 
