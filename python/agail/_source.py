@@ -6,7 +6,7 @@ import copy
 import importlib
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import gymnasium
 import numpy as np
@@ -14,8 +14,14 @@ from gymnasium import spaces
 
 from agail import _core
 from agail._core import InputError
+from agail._vector import OfOne
 
-EnvironmentLike = str | gymnasium.Env | gymnasium.vector.VectorEnv | Callable[[], gymnasium.Env]
+EnvironmentLike = (
+    str
+    | gymnasium.Env
+    | gymnasium.vector.VectorEnv
+    | Callable[[], gymnasium.Env | gymnasium.vector.VectorEnv]
+)
 
 
 def _unsupported(name: str, kind: str, space: spaces.Space, advice: str) -> InputError:
@@ -105,12 +111,12 @@ class Lane:
         self._observe = source.observations
         self._act = source.actions
         self._name = source.name
-        self._steps = 0
+        self.steps = 0
         self.action = np.zeros(source.actions.size, np.float32)
 
     def _failed(self, call: str, error: Exception) -> InputError:
         return InputError(
-            f"environment {self._name}: {call} raised {type(error).__name__} after {self._steps} "
+            f"environment {self._name}: {call} raised {type(error).__name__} after {self.steps} "
             f"steps of an episode: {error}"
         )
 
@@ -122,7 +128,7 @@ class Lane:
         )
 
     def reset(self, seed: int) -> np.ndarray:
-        self._steps = 0
+        self.steps = 0
         try:
             result = self._environment.reset(seed=seed)
         except Exception as error:
@@ -139,7 +145,7 @@ class Lane:
         if not isinstance(result, tuple) or len(result) != 5:
             expected = "(observation, reward, terminated, truncated, info)"
             raise self._unexpected("step()", result, expected)
-        self._steps += 1
+        self.steps += 1
         observation, reward, terminated, truncated, _ = result
         try:
             reward, terminated, truncated = float(reward), bool(terminated), bool(truncated)
@@ -157,6 +163,9 @@ class Lane:
 
     def close(self) -> None:
         self._source.give_back(self._environment)
+
+
+AnyLane = TypeVar("AnyLane", bound=Lane)
 
 
 def _is_built_in(environment: EnvironmentLike) -> bool:
@@ -187,9 +196,10 @@ class Source:
             functions = getattr(environment.unwrapped, "env_fns", None)
             if not functions or environment.unwrapped is not environment:
                 raise InputError(
-                    f"{environment} does not tell how its environments are made; give a "
-                    "SyncVectorEnv or AsyncVectorEnv without wrappers, or a function that makes one "
-                    "environment, with lanes=N"
+                    f"{environment} does not tell how its environments are made, and steps them all at "
+                    "once, but lanes run on their own; give a SyncVectorEnv or AsyncVectorEnv without "
+                    "wrappers, or a function that makes one environment (a vector environment with "
+                    "num_envs=1 will do), with lanes=N"
                 )
             return functions[0]
         if isinstance(environment, gymnasium.Env):
@@ -231,6 +241,8 @@ class Source:
         if self._idle:
             return self._idle.pop()
         made = self._make()
+        if isinstance(made, gymnasium.vector.VectorEnv):
+            made = OfOne(made)
         if not isinstance(made, gymnasium.Env):
             raise InputError(f"{self._make!r} returned {made!r}, which is no gymnasium.Env")
         self._made.append(made)
@@ -243,17 +255,18 @@ class Source:
         return {"id": self.name, **sizes, **self.actions.spec()}
 
     def make(self, name: str) -> Lane | None:
-        if name != self.name:
-            return None
+        return self.lane(Lane) if name == self.name else None
+
+    def lane(self, kind: type[AnyLane]) -> AnyLane:
         environment = self._take()
-        for kind, mine in (("observation", self.observations), ("action", self.actions)):
-            other = getattr(environment, f"{kind}_space")
+        for what, mine in (("observation", self.observations), ("action", self.actions)):
+            other = getattr(environment, f"{what}_space")
             if other != mine.space:
                 raise InputError(
-                    f"environment {name}: the {kind} space is {other} in one instance and "
+                    f"environment {self.name}: the {what} space is {other} in one instance and "
                     f"{mine.space} in another; all must be of one kind"
                 )
-        return Lane(self, environment)
+        return kind(self, environment)
 
     def give_back(self, environment: gymnasium.Env) -> None:
         self._idle.append(environment)

@@ -13,9 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from agail import _core
 from agail._core import InputError
+from agail.formats import d4rl, imitation, lerobot
+from agail.formats.arrays import arrays_of, core_of
 
 if TYPE_CHECKING:
     import minari
+    from imitation.data.types import Trajectory
 
 
 @dataclass(frozen=True)
@@ -71,53 +74,25 @@ class Demonstrations(Sequence[Episode]):
         episode is its final state, and that row's action and reward are not used. environment: the
         Gymnasium id, which gives the action space.
         """
-        table = np.asarray(observations)
-        if table.ndim != 2:
-            raise InputError(f"observations have the shape {table.shape}, not (steps, numbers)")
-        rows = len(table)
+        arrays = {
+            "observations": observations,
+            "actions": actions,
+            "episodes": episodes,
+            "next_observations": next_observations,
+            "rewards": rewards,
+            "terminations": terminations,
+            "truncations": truncations,
+            "action_available": action_available,
+        }
+        return cls(core_of(arrays, environment))
 
-        def column(name: str, value: ArrayLike | None) -> list[float]:
-            if value is None:
-                return []
-            array = np.asarray(value, np.float64)
-            if array.shape != (rows,):
-                raise InputError(
-                    f"{name} have the shape {array.shape}, the observations {rows} rows"
-                )
-            return array.tolist()
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """The reverse of from_arrays(): its arguments by name, with next_observations.
 
-        act = np.empty((rows, 0)) if actions is None else np.asarray(actions)
-        discrete = act.ndim == 1 and np.issubdtype(act.dtype, np.integer)
-        act = act.astype(np.float64).reshape(len(act), -1) if act.ndim < 3 else act
-        if act.shape[:1] != (rows,) or act.ndim != 2:
-            raise InputError(f"actions have the shape {act.shape}, the observations {rows} rows")
-        if action_available is not None:
-            known = np.asarray(action_available, bool)
-            known = known[:, None] if known.ndim == 1 else known
-            if known.shape not in ((rows, 1), act.shape):
-                raise InputError(f"action_available has the shape {known.shape}, not {act.shape}")
-            act = np.where(known, act, np.nan)
-        following = None
-        if next_observations is not None:
-            following = np.ascontiguousarray(next_observations, np.float64)
-            if following.shape != table.shape:
-                raise InputError(
-                    f"next_observations have the shape {following.shape}, not {table.shape}"
-                )
-        return cls(
-            _core.Demonstrations.from_table(
-                np.ascontiguousarray(table, np.float64),
-                np.ascontiguousarray(act),
-                following,
-                column("rewards", rewards),
-                column("terminations", terminations),
-                column("truncations", truncations),
-                column("episodes", episodes),
-                discrete,
-                table.dtype == np.float32,
-                environment,
-            )
-        )
+        actions are float32, NaN where missing; discrete ones int64, with action_available if any is
+        missing. numpy.savez(path, **demos.to_arrays()) is a file that `agail convert` reads.
+        """
+        return arrays_of(self._core)
 
     @classmethod
     def from_minari(cls, dataset: str | minari.MinariDataset) -> Demonstrations:
@@ -138,6 +113,54 @@ class Demonstrations(Sequence[Episode]):
                 f"{dataset.spec.dataset_id}, which is read as a whole; give the whole dataset"
             )
         return whole
+
+    @classmethod
+    def from_trajectories(
+        cls, trajectories: Sequence[Trajectory], *, environment: str = ""
+    ) -> Demonstrations:
+        """From `imitation`'s trajectories: a sequence of objects with obs (T+1, ...) and acts (T, ...).
+
+        terminal and infos (SB3's "TimeLimit.truncated") say how each ended, rews are kept; arrays of
+        more dimensions are laid out in a row. acts (T,) of integers are discrete; NaN is missing.
+        """
+        return cls(core_of(imitation.read(trajectories), environment, "the trajectories"))
+
+    def to_trajectories(self) -> list[Trajectory]:
+        """For `imitation`, which must be installed: TrajectoryWithRew, or Trajectory without rewards.
+
+        Missing actions are NaN there; discrete ones cannot be missing (InputError).
+        """
+        return imitation.write(self, self._core.discrete, self._core.float32)
+
+    @classmethod
+    def from_d4rl(cls, path: str | os.PathLike[str], *, environment: str = "") -> Demonstrations:
+        """A D4RL .hdf5 file: observations, actions, rewards, terminals, timeouts, one row a step.
+
+        Without next_observations the last row of an episode is its final state, and that row's action
+        is not used. NaN actions are missing. Needs h5py.
+        """
+        return cls(core_of(d4rl.read(path), environment, os.fspath(path)))
+
+    def to_d4rl(self, path: str | os.PathLike[str]) -> None:
+        """The reverse; NaN, or 0 in infos/action_available (discrete), where an action is missing."""
+        d4rl.write(self.to_arrays(), path)
+
+    @classmethod
+    def from_lerobot(cls, path: str | os.PathLike[str], *, environment: str = "") -> Demonstrations:
+        """A LeRobot dataset's folder (v2 or v3), or one of its Parquet files. Needs pyarrow.
+
+        Columns observation.state, action, episode_index; frame_index and next.reward if they are there.
+        An action that is null or NaN, or has such entries, is missing. The last frame of an episode is
+        its final state, and its action is not used.
+        """
+        return cls(core_of(lerobot.read(path), environment, os.fspath(path)))
+
+    def to_lerobot(self, path: str | os.PathLike[str], *, fps: int = 30) -> None:
+        """A LeRobot dataset (v3.0) in a new folder; fps: frames a second, for the timestamps.
+
+        Missing actions are NaN (discrete: null). Final states are in next.observation.state.
+        """
+        lerobot.write(self.to_arrays(), path, self.environment or "demonstrations", fps)
 
     def mask(
         self,

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agail import _core
+from agail import _core, _recording
 from agail._core import InputError, Policy
+from agail._recording import Predictor
 from agail._source import EnvironmentLike, Registered, Source, source_of
 from agail.demonstrations import Demonstrations
 
@@ -244,7 +245,7 @@ def evaluate(
 
 
 def record(
-    policy: Policy | Run | str | os.PathLike[str],
+    policy: Policy | Run | str | os.PathLike[str] | Predictor,
     episodes: int,
     *,
     environment: EnvironmentLike | None = None,
@@ -252,7 +253,19 @@ def record(
     deterministic: bool = True,
     threads: int | None = None,
 ) -> Demonstrations:
-    """Complete demonstrations from a policy, as `agail record` makes them."""
+    """Complete demonstrations from a policy, as `agail record` makes them.
+
+    policy: also a model of stable-baselines3, or any object with its predict(); then `environment` must
+    be given. predict() sees the environment's own observations: a model that was trained behind
+    VecNormalize needs an environment or an object that normalises.
+    """
+    if not isinstance(policy, Policy | Run | str | os.PathLike):
+        if not callable(getattr(policy, "predict", None)):
+            raise InputError(f"{policy!r} is no policy: it has no predict()")
+        if environment is None:
+            raise InputError("record() of such a policy needs the environment to record in")
+        counts = _whole("episodes", episodes, 1), _whole("seed", seed, 0)
+        return Demonstrations(_recording.record(policy, environment, *counts, deterministic))
     policy = _policy(policy)
     core = _play(_core.record, policy, episodes, environment, seed, deterministic, threads)
     return Demonstrations(core)

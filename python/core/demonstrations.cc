@@ -52,16 +52,16 @@ RowMatrix<double> matrix(const InputArray<double>& array) {
                                              static_cast<Eigen::Index>(array.shape(1)));
 }
 
-// Arrays are checked for shape by the caller (agail/demonstrations.py).
+// Arrays are checked for shape by the caller (agail/formats/arrays.py).
 Demonstrations from_table(const InputArray<double>& observations, const InputArray<double>& actions,
                           const std::optional<InputArray<double>>& next_observations,
                           const std::vector<double>& rewards,
                           const std::vector<double>& terminations,
                           const std::vector<double>& truncations,
                           const std::vector<double>& episodes, bool discrete, bool float32,
-                          const std::string& environment) {
+                          const std::string& environment, const std::string& where) {
   StepTable table;
-  table.where = "the arrays";
+  table.where = where;
   table.observations = matrix(observations);
   table.actions = matrix(actions);
   if (next_observations) table.next_observations = matrix(*next_observations);
@@ -113,7 +113,7 @@ void bind_demonstrations(nb::module_& module) {
       .def_static("from_table", &from_table, nb::arg("observations"), nb::arg("actions"),
                   nb::arg("next_observations").none(), nb::arg("rewards"), nb::arg("terminations"),
                   nb::arg("truncations"), nb::arg("episodes"), nb::arg("discrete"),
-                  nb::arg("float32"), nb::arg("environment"))
+                  nb::arg("float32"), nb::arg("environment"), nb::arg("where"))
       .def("masked", &masked, nb::arg("missing"), nb::arg("pattern"), nb::arg("seed"),
            nb::arg("dimension").none())
       .def("episode", &episode, nb::arg("index"))
@@ -123,6 +123,8 @@ void bind_demonstrations(nb::module_& module) {
                    [](const Demonstrations& demos) { return demos.observation_dim; })
       .def_prop_ro("action_dim", [](const Demonstrations& demos) { return demos.action.dim; })
       .def_prop_ro("discrete", [](const Demonstrations& demos) { return demos.action.discrete; })
+      .def_prop_ro("float32",
+                   [](const Demonstrations& demos) { return demos.observations_are_float32; })
       .def_prop_ro("transitions", &Demonstrations::transitions)
       .def_prop_ro("missing_ratio", &Demonstrations::missing_ratio)
       .def_prop_ro("pattern", [](const Demonstrations& demos) { return demos.pattern; })

@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from same import same
 
 import agail
 
@@ -17,13 +18,6 @@ def arrays():
         "actions": random.uniform(-1, 1, size=(rows, 3)),
         "episodes": np.repeat([0, 1, 2], 20),
     }
-
-
-def same(one, other):
-    assert len(one) == len(other)
-    for a, b in zip(one, other):
-        for name in ("observations", "actions", "available", "rewards", "terminations"):
-            np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
 def test_save_and_load(hopper_demos, tmp_path):

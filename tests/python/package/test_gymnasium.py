@@ -38,6 +38,22 @@ def test_trains_on(name):
     assert imitator.policy.demonstrations_mean_return == pytest.approx(demos.mean_return)
 
 
+@pytest.mark.parametrize("continuous", [False, True])
+def test_lunar_lander(continuous):
+    """An environment of another package (Box2D), with a keyword that changes its actions."""
+
+    def make():
+        return gymnasium.make("LunarLander-v3", continuous=continuous)
+
+    run = train(make, method="trpo", timesteps=2048, run={"batch_steps": 512})
+    assert run.finished and run.policy.n_actions == (0 if continuous else 4)
+    demos = agail.record(run, 2, environment=make)
+    assert demos.environment == "LunarLander-v3" and demos.action_dim == (2 if continuous else 1)
+    assert train(make, demos.mask(0.5), method="agail", timesteps=512).finished
+    if not continuous:  # also by its id
+        assert train("LunarLander-v3", demos.mask(0.5), method="bc", timesteps=1).finished
+
+
 def test_learns_on_a_gymnasium_environment():
     """Gymnasium's CartPole, in Python, is learned as well as ours."""
     # Not by its id, which is ours.
