@@ -72,21 +72,17 @@ def read(path: str | os.PathLike[str]) -> Arrays:
 
 
 def write(arrays: Arrays, path: str | os.PathLike[str]) -> None:
-    """next_observations are written too: without them a final state is lost."""
+    """next_observations are written too: without them a final state is lost. Whole or not at all."""
     path = Path(path)
     h5py = needed("h5py", "writing D4RL files")
-    count = len(arrays["observations"])
     partial = path.with_name(f"{path.name}.partial")
-    with h5py.File(partial, "w") as file:
-        for name in ("observations", "next_observations", "actions"):
-            if name in arrays:
-                file[name] = arrays[name]
-        file["rewards"] = arrays.get("rewards", np.zeros(0))
-        if "rewards" not in arrays:
-            del file["rewards"]
-        file["terminals"] = np.asarray(arrays["terminations"], bool)
-        file["timeouts"] = np.asarray(arrays["truncations"], bool)
-        if "action_available" in arrays:
-            file["infos/action_available"] = np.asarray(arrays["action_available"], np.uint8)
-        assert len(file["terminals"]) == count
-    partial.replace(path)
+    titles = {name: NAMES.get(name, name) for name in arrays if name != "episodes"}
+    try:
+        with h5py.File(partial, "w") as file:
+            for name, title in titles.items():
+                file[title] = arrays[name]
+        partial.replace(path)
+    except OSError as error:
+        if partial.exists():
+            partial.unlink()
+        raise InputError(f"{path} cannot be written: {error}") from error

@@ -36,6 +36,8 @@ def _one(where: str, trajectory: Any) -> Arrays:
         )
     # imitation says "terminal" of a whole episode, however it ended; SB3's infos know more.
     infos = getattr(trajectory, "infos", None)
+    if infos is not None and len(infos) != steps:
+        raise InputError(f"{where} has {len(infos)} infos and {steps} actions")
     cut = infos is not None and bool(infos[-1].get("TimeLimit.truncated", False))
     terminated = bool(getattr(trajectory, "terminal", False)) and not cut
     last = np.arange(steps) == steps - 1
@@ -77,25 +79,31 @@ def read(trajectories: Sequence[Trajectory]) -> Arrays:
     return {**arrays, "episodes": np.repeat(np.arange(len(parts)), lengths)}
 
 
+def _actions(episode: Episode, discrete: bool) -> np.ndarray:
+    if not episode.actions.shape[1]:
+        raise InputError("these demonstrations have no actions; imitation's trajectories do")
+    if not discrete:
+        return episode.actions.astype(np.float32)
+    if not episode.available.all():
+        raise InputError(
+            "imitation's trajectories cannot say that a discrete action is missing; give complete "
+            "demonstrations (continuous actions are NaN where missing)"
+        )
+    return episode.actions[:, 0].astype(np.int64)
+
+
 def write(episodes: Sequence[Episode], discrete: bool, float32: bool) -> list[Trajectory]:
     types = needed("imitation.data.types", "to_trajectories()")
     result = []
     for episode in episodes:
-        obs = episode.observations.astype(np.float32 if float32 else np.float64)
-        acts: np.ndarray = episode.actions.astype(np.float32)
-        if discrete:
-            if not episode.available.all():
-                raise InputError(
-                    "imitation's trajectories cannot say that a discrete action is missing; "
-                    "continuous ones are NaN there"
-                )
-            acts = episode.actions[:, 0].astype(np.int64)
-        if not episode.actions.shape[1]:
-            raise InputError("these demonstrations have no actions; imitation's trajectories do")
-        cut = bool(episode.truncations[-1])
-        infos = np.array([{} for _ in range(len(episode))])
-        infos[-1]["TimeLimit.truncated"] = cut
-        common = {"obs": obs, "acts": acts, "infos": infos, "terminal": True}
+        infos: Any = np.array([{} for _ in range(len(episode))])
+        infos[-1]["TimeLimit.truncated"] = bool(episode.truncations[-1])
+        common = {
+            "obs": episode.observations.astype(np.float32 if float32 else np.float64),
+            "acts": _actions(episode, discrete),
+            "infos": infos,
+            "terminal": True,
+        }
         if episode.rewards is None:
             result.append(types.Trajectory(**common))
         else:

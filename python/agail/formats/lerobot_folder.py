@@ -113,13 +113,17 @@ def write_folder(
         for name, values in columns.items()
     }
     partial = path.with_name(f"{path.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    for folder in ("data/chunk-000", "meta/episodes/chunk-000"):
-        (partial / folder).mkdir(parents=True)
     data = {name: _arrow(arrow, values, missing.get(name)) for name, values in columns.items()}
-    parquet.write_table(arrow.table(data), partial / "data" / FILE)
-    parquet.write_table(_episodes(arrow, lengths, task), partial / "meta/episodes" / FILE)
-    parquet.write_table(_tasks(arrow, task), partial / "meta/tasks.parquet")
-    (partial / "meta/info.json").write_text(json.dumps(info, indent=4))
-    (partial / "meta/stats.json").write_text(json.dumps(stats, indent=4))
-    partial.rename(path)
+    try:
+        shutil.rmtree(partial, ignore_errors=True)
+        for folder in ("data/chunk-000", "meta/episodes/chunk-000"):
+            (partial / folder).mkdir(parents=True)
+        parquet.write_table(arrow.table(data), partial / "data" / FILE)
+        parquet.write_table(_episodes(arrow, lengths, task), partial / "meta/episodes" / FILE)
+        parquet.write_table(_tasks(arrow, task), partial / "meta/tasks.parquet")
+        (partial / "meta/info.json").write_text(json.dumps(info, indent=4))
+        (partial / "meta/stats.json").write_text(json.dumps(stats, indent=4))
+        partial.rename(path)
+    except OSError as error:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise InputError(f"{path} cannot be written: {error}") from error
