@@ -108,7 +108,7 @@ def test_the_example(capsys, monkeypatch):
     package("stable_baselines3")
     monkeypatch.setattr(sys, "argv", [str(EXAMPLE)])
     names = runpy.run_path(str(EXAMPLE))
-    assert names["recorded"].mean_return > 400, "no expert"
+    assert names["recorded"].mean_return > 300, "no expert"
     assert names["demonstrations"].missing_ratio == pytest.approx(0.75, abs=0.01)
     assert names["result"].share_of_demonstrations > 0.9
     assert names["agreement"] > 0.8
