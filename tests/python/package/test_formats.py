@@ -330,7 +330,7 @@ def test_what_is_no_dataset_of_lerobot(tmp_path):
 
 
 def test_the_folder_that_lerobot_reads(hopper_demos, tmp_path):
-    """What LeRobot 0.4 looks up in meta/: the documented format, v3.0. Its own reader is in test_peers.py."""
+    """What LeRobot 0.4 looks up in meta/: the documented format, v3.0."""
     demos = hopper_demos.mask(0.5)
     demos.to_lerobot(tmp_path / "d", fps=125)
     info = json.loads((tmp_path / "d/meta/info.json").read_text())
