@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Draws the paper's figures 2 and 3 from the records of `agail reproduce table1`, the paper's values beside (needs matplotlib).
 
-    benchmarks/table1_figures.py DIR     writes DIR/figure2.svg, .png and DIR/figure3.svg, .png
+    benchmarks/table1_figures.py DIR                        writes DIR/figure2.svg, .png and DIR/figure3.svg, .png
+    benchmarks/table1_figures.py DIR --methods docs/figures  the curves of each method besides, for its page: curve-METHOD.svg
 
 Figure 2: smoothed return of the training episodes against environment steps, mean over the seeds and its standard error;
 left ours, right the paper's. Figure 3: the return at the end of that against the share of missing actions, TRPO and
@@ -36,6 +37,7 @@ COLOURS = {
     "AGAIL.50": "#4c9ed9",
     "AGAIL.75": "#8cc5ec",
 }
+METHODS = {"trpo": "TRPO", "gail": "GAIL", "state-gail": "state-GAIL", "agail": "AGAIL"}
 
 
 def read(path: Path) -> list[dict]:
@@ -106,6 +108,26 @@ def figure2(ours: dict, environments: list[str]) -> plt.Figure:
     return figure
 
 
+def method_figure(ours: dict, environments: list[str], labels: list[str]) -> plt.Figure:
+    figure, axes = plt.subplots(
+        1, len(environments), figsize=(2.8 * len(environments), 2.4), layout="constrained",
+        squeeze=False,
+    )  # fmt: skip
+    for axis, environment in zip(axes[0], environments, strict=True):
+        for label in labels:
+            if (environment, label) in ours:
+                x, rows = ours[environment, label]
+                band(axis, x, rows.mean(0), rows.std(0) / np.sqrt(len(rows)), label)
+        axis.set_title(environment, fontsize=9)
+        axis.set_xlabel("environment steps")
+        axis.xaxis.set_major_formatter(lambda x, _: f"{x / 1000:.0f}k")
+        axis.set_ylim(bottom=0)
+    axes[0][0].set_ylabel("training return")
+    if len(labels) > 1:
+        axes[0][0].legend(fontsize=6, loc="lower right")
+    return figure
+
+
 def figure3(table: list[dict], environments: list[str]) -> plt.Figure:
     figure, axes = plt.subplots(
         1, len(environments), figsize=(3.2 * len(environments), 3), layout="constrained",
@@ -141,19 +163,28 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", type=Path, help="the --out of agail reproduce table1")
-    folder = parser.parse_args().folder
+    parser.add_argument("--methods", type=Path, metavar="DIR", help="curves of each method, too")
+    options = parser.parse_args()
+    folder = options.folder
     if not (folder / "table.csv").exists():
         parser.error(f"{folder}/table.csv: no such file; run agail reproduce table1 first")
     table = read(folder / "table.csv")
     environments = [e for e in ENVIRONMENTS if any(row["environment"] == e for row in table)]
     plt.rcParams["svg.hashsalt"] = "agail"
+    ours = our_curves(folder)
     for name, figure in {
-        "figure2": figure2(our_curves(folder), environments),
+        "figure2": figure2(ours, environments),
         "figure3": figure3(table, environments),
     }.items():
         figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
         figure.savefig(folder / f"{name}.png", dpi=150)
         print(folder / f"{name}.svg", folder / f"{name}.png")
+    if options.methods:
+        for method, prefix in METHODS.items():
+            labels = [label for label in COLOURS if label.startswith(prefix)]
+            file = options.methods / f"curve-{method}.svg"
+            method_figure(ours, environments, labels).savefig(file, metadata={"Date": None})
+            print(file)
 
 
 if __name__ == "__main__":
