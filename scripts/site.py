@@ -5,14 +5,18 @@ CHANGELOG.md become pages; other files that a page links are copied to the site 
 which a site can show nothing, becomes plain text.
 """
 
-import os
+import posixpath
 import re
 from pathlib import Path
 
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changes.md"}
+PAGES = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changes.md",
+}
 ORIGINS = {page: origin for origin, page in PAGES.items()}
 # Text and target of links and pictures; code spans are skipped.
 LINK = re.compile(r"`[^`\n]+`|(!?)\[((?:[^\[\]]|`[^`]*`)*)\]\(([^()\s]+)\)")
@@ -27,7 +31,7 @@ def in_tree(page: str, target: str) -> str | None:
     """The path in the tree that a link means; None for addresses and links within the page."""
     if not target or target.startswith("#") or re.match(r"[a-z]+:", target):
         return None
-    return os.path.normpath(os.path.join(os.path.dirname(origin(page)), target))
+    return posixpath.normpath(posixpath.join(posixpath.dirname(origin(page)), target))
 
 
 def in_site(path: str) -> str:
@@ -51,7 +55,7 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, page, config, files):
-    here = os.path.dirname(page.file.src_uri)
+    here = posixpath.dirname(page.file.src_uri)
 
     def rewritten(match: re.Match) -> str:
         target, hash_, anchor = (match[3] or "").partition("#")
@@ -60,7 +64,7 @@ def on_page_markdown(markdown, page, config, files):
             return match[0]
         if (ROOT / path).is_dir():
             return match[2]
-        link = os.path.relpath(in_site(path), here or ".") + hash_ + anchor
+        link = posixpath.relpath(in_site(path), here or ".") + hash_ + anchor
         return f"{match[1]}[{match[2]}]({link})"
 
     return LINK.sub(rewritten, markdown)

@@ -30,7 +30,13 @@ def finished(folder, demonstrations, **arguments):
     if resume and agail.Run(folder).finished:
         return agail.Run(folder)
     return agail.train(
-        "Hopper-v5", demonstrations, out=folder, threads=1, progress=False, resume=resume, **arguments
+        "Hopper-v5",
+        demonstrations,
+        out=folder,
+        threads=1,
+        progress=False,
+        resume=resume,
+        **arguments,
     )
 
 
@@ -47,7 +53,7 @@ def compare(name, variants, arguments):
                 **{
                     "timesteps": arguments.timesteps,
                     "seed": seed,
-                    "run": {"evaluate_every": 5, "evaluation_episodes": 3},
+                    "run": {"evaluate_every": 0},  # evaluated below
                     **settings,
                 },
             )

@@ -6,7 +6,7 @@ demonstrations what the silent actuator did. Only interaction can tell.
 
 from comparison import compare, options, recorded
 
-JOINTS = {"thigh": 0, "foot": 2}  # Hopper's actions are torques at thigh, leg and foot
+JOINTS = {"foot": 2, "thigh": 0}  # Hopper's actions are torques at thigh, leg and foot
 
 if __name__ == "__main__":
     arguments = options(__doc__)
@@ -16,5 +16,3 @@ if __name__ == "__main__":
         print(demonstrations)
         methods = ["agail", "bco", "bc"]
         compare(f"dead-{joint}", {m: (demonstrations, {"method": m}) for m in methods}, arguments)
-    # Reads no action, so it does not matter which are there.
-    compare("dead-any", {"state-gail": (whole, {"method": "state-gail"})}, arguments)

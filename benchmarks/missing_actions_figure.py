@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+"""Draws docs/figures/missing_actions.svg from what the scripts of examples/missing_actions left (needs matplotlib).
+
+Return as a share of the demonstrations': a bar to the mean of the seeds, a dot for each. Copies the numbers to
+results/missing_actions.csv, which it reads if there is no --work.
+"""
+
+import argparse
+import csv
+from collections import defaultdict
+from pathlib import Path
+from statistics import mean
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+from measure import ROOT
+
+RESULTS = ROOT / "results/missing_actions.csv"
+TITLES = {
+    "dropout": "Drop-out in bursts",
+    "dead-thigh": "Thigh never logged",
+    "dead-foot": "Foot never logged",
+    "motion-capture": "Motion capture",
+}
+COLOURS = {"agail": "#1b6ca8", "gail": "#8f5fb0", "state-gail": "#d9822b", "bc": "#5a8f3c"}
+
+
+def collect(work: Path) -> None:
+    rows = []
+    for name in [*TITLES, "dead-any"]:
+        with (work / f"{name}.csv").open() as file:
+            rows += [{"pattern": name, **row} for row in csv.DictReader(file)]
+    with RESULTS.open("w", newline="") as file:
+        writer = csv.DictWriter(file, ["pattern", "variant", "seed", "share"], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def shares() -> dict[str, dict[str, list[float]]]:
+    """By pattern and variant. What reads no action belongs to every dead channel."""
+    table: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    with RESULTS.open() as file:
+        for row in csv.DictReader(file):
+            table[row["pattern"]][row["variant"]].append(float(row["share"]))
+    for name in ("dead-thigh", "dead-foot"):
+        table[name].update(table["dead-any"])
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--work", type=Path, help="the examples' --work")
+    arguments = parser.parse_args()
+    if arguments.work:
+        collect(arguments.work)
+    table = shares()
+    plt.rcParams["svg.hashsalt"] = "agail"
+    figure, axes = plt.subplots(2, 2, figsize=(8, 4.6), sharex=True, layout="constrained")
+    for axis, (name, title) in zip(axes.flat, TITLES.items(), strict=True):
+        variants = list(table[name])
+        for row, variant in enumerate(variants):
+            seeds = table[name][variant]
+            colour = COLOURS.get(variant.split()[0], "#777777")
+            axis.barh(row, mean(seeds), color=colour, alpha=0.45, height=0.7)
+            axis.plot(seeds, [row] * len(seeds), "o", color=colour, ms=5)
+        axis.set_yticks(range(len(variants)), variants)
+        axis.invert_yaxis()
+        axis.axvline(1, color="black", lw=0.8)
+        axis.set_xlim(0, 1.08)
+        axis.xaxis.set_major_formatter(lambda x, _: f"{x:.0%}")
+        axis.set_title(title, fontsize=10)
+    figure.supxlabel("return as a share of the demonstrations'", fontsize=9)
+    out = ROOT / "docs/figures/missing_actions.svg"
+    figure.savefig(out, metadata={"Date": None})
+    print(out.relative_to(ROOT))
+
+
+if __name__ == "__main__":
+    main()
