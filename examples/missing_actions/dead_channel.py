@@ -14,5 +14,5 @@ if __name__ == "__main__":
     for joint, channel in JOINTS.items():
         demonstrations = whole.mask(1 / 3, "dimension", dimension=channel)
         print(demonstrations)
-        methods = ["agail", "bco", "bc"]
+        methods = ["agail", "bc", "bco"]
         compare(f"dead-{joint}", {m: (demonstrations, {"method": m}) for m in methods}, arguments)

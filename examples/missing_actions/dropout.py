@@ -37,5 +37,5 @@ if __name__ == "__main__":
     arguments = options(__doc__)
     demonstrations = lost(recorded(arguments.work, 3), np.random.default_rng(0))
     print(demonstrations)
-    methods = ["agail", "gail", "state-gail", "bc"]
+    methods = ["agail", "bc", "state-gail", "gail"]
     compare("dropout", {m: (demonstrations, {"method": m}) for m in methods}, arguments)

@@ -44,8 +44,8 @@ if __name__ == "__main__":
     positions = {"discriminator": {"features": [0, 1, 2, 3, 4]}}
     variants = {
         "agail": {"method": "agail", "start": {"method": "clone"}, **positions},
-        "state-gail": {"method": "state-gail", **positions},
         "bc": {"method": "bc"},
+        "state-gail": {"method": "state-gail", **positions},
         "agail on all": {"method": "agail"},
     }
     compare("motion-capture", {k: (demonstrations, v) for k, v in variants.items()}, arguments)

@@ -69,6 +69,7 @@ def place(tmp_path, monkeypatch):
     shutil.copy(ROOT / "models/hopper.xml", tmp_path)
     np.savez(tmp_path / "my-arrays.npz", **arrays())
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     return tmp_path
 
@@ -105,6 +106,8 @@ def shortened(words):
 def provide(words, material):
     """Puts in place what the command reads; takes away what it is to create."""
     out = value_of(words, "--out")
+    if out:
+        Path(out).parent.mkdir(parents=True, exist_ok=True)
     if out and "--resume" not in words:
         shutil.rmtree(out) if Path(out).is_dir() else Path(out).unlink(missing_ok=True)
     demos = value_of(words, "--demos")
@@ -126,6 +129,8 @@ def provide(words, material):
 
 
 def run_agail(agail, words, where, material):
+    # What a page has at the root of its machine belongs into the page's folder here.
+    words = [f"root{word}" if word.startswith("/") else word for word in words]
     words = [os.path.expandvars(word) for word in words]
     if words[0] == "reproduce":
         # Hours. An --out that cannot be made is what it looks at after the options.
@@ -244,7 +249,7 @@ def python_names(material, place, monkeypatch):
         for key, _, value in small:
             section, _, name = key.partition(".")
             settings.setdefault(section, {}).setdefault(name, eval(value))
-        return train(*arguments, progress=False, **settings)
+        return train(*arguments, **{**settings, "progress": False})
 
     monkeypatch.setattr(package, "train", short)
     shutil.copy(material / "Hopper-v5.hdf5", place / "my-demos.hdf5")

@@ -1,12 +1,16 @@
 #!/usr/bin/env python3
-"""Draws docs/figures/missing_actions.svg from what the scripts of examples/missing_actions left (needs matplotlib).
+"""Publishes what the scripts of examples/missing_actions measured (needs matplotlib).
 
-Return as a share of the demonstrations': a bar to the mean of the seeds, a dot for each. Copies the numbers to
-results/missing_actions.csv, which it reads if there is no --work.
+    benchmarks/missing_actions.py --work runs/missing-actions
+
+writes results/missing_actions.csv and, from it, the tables of docs/missing-actions.md (between its marks <!-- measured -->)
+and docs/figures/missing_actions.svg: return as a share of the demonstrations', a bar to the mean of the seeds, a dot
+for each. Without --work the numbers are those of results/missing_actions.csv.
 """
 
 import argparse
 import csv
+import re
 from collections import defaultdict
 from pathlib import Path
 from statistics import mean
@@ -20,8 +24,8 @@ from measure import ROOT
 RESULTS = ROOT / "results/missing_actions.csv"
 TITLES = {
     "dropout": "Drop-out in bursts",
-    "dead-thigh": "Thigh never logged",
     "dead-foot": "Foot never logged",
+    "dead-thigh": "Thigh never logged",
     "motion-capture": "Motion capture",
 }
 COLOURS = {"agail": "#1b6ca8", "gail": "#8f5fb0", "state-gail": "#d9822b", "bc": "#5a8f3c"}
@@ -29,7 +33,7 @@ COLOURS = {"agail": "#1b6ca8", "gail": "#8f5fb0", "state-gail": "#d9822b", "bc":
 
 def collect(work: Path) -> None:
     rows = []
-    for name in [*TITLES, "dead-any"]:
+    for name in TITLES:
         with (work / f"{name}.csv").open() as file:
             rows += [{"pattern": name, **row} for row in csv.DictReader(file)]
     with RESULTS.open("w", newline="") as file:
@@ -39,14 +43,26 @@ def collect(work: Path) -> None:
 
 
 def shares() -> dict[str, dict[str, list[float]]]:
-    """By pattern and variant. What reads no action belongs to every dead channel."""
+    """By pattern and variant."""
     table: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     with RESULTS.open() as file:
         for row in csv.DictReader(file):
             table[row["pattern"]][row["variant"]].append(float(row["share"]))
-    for name in ("dead-thigh", "dead-foot"):
-        table[name].update(table["dead-any"])
     return table
+
+
+def write_tables(table: dict[str, dict[str, list[float]]]) -> None:
+    page = ROOT / "docs/missing-actions.md"
+
+    def rows(match: re.Match) -> str:
+        lines = ["| | mean | worst | each seed |", "| --- | --- | --- | --- |"]
+        for variant, seeds in table[match[1]].items():
+            each = ", ".join(f"{share:.0%}" for share in seeds)
+            lines.append(f"| {variant} | {mean(seeds):.0%} | {min(seeds):.0%} | {each} |")
+        return "\n".join([f"<!-- measured {match[1]} -->", *lines, "<!-- end -->"])
+
+    marked = re.compile(r"<!-- measured (\S+) -->\n.*?<!-- end -->", re.DOTALL)
+    page.write_text(marked.sub(rows, page.read_text()))
 
 
 def main() -> None:
@@ -58,6 +74,7 @@ def main() -> None:
     if arguments.work:
         collect(arguments.work)
     table = shares()
+    write_tables(table)
     plt.rcParams["svg.hashsalt"] = "agail"
     figure, axes = plt.subplots(2, 2, figsize=(8, 4.6), sharex=True, layout="constrained")
     for axis, (name, title) in zip(axes.flat, TITLES.items(), strict=True):
