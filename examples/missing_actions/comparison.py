@@ -23,42 +23,27 @@ def recorded(work, episodes):
     return agail.record(finished(work / "demonstrator", DATA, timesteps=40_000), episodes, seed=7)
 
 
-def finished(folder, demonstrations, **arguments):
+def finished(folder, demonstrations, **settings):
     """The run in this folder; trained, or trained on, only if it is not finished."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     resume = (folder / "config.toml").exists()
     if resume and agail.Run(folder).finished:
         return agail.Run(folder)
-    return agail.train(
-        "Hopper-v5",
-        demonstrations,
-        out=folder,
-        threads=1,
-        progress=False,
-        resume=resume,
-        **arguments,
-    )
+    settings |= {"out": folder, "threads": 1, "progress": False, "resume": resume}
+    return agail.train("Hopper-v5", demonstrations, **settings)
 
 
 def compare(name, variants, arguments):
-    """variants: {label: (demonstrations, arguments of agail.train)}. Writes NAME.csv to the work folder."""
+    """variants: {label: (demonstrations, settings of agail.train)}. Writes NAME.csv to the work folder."""
     rows = []
     print(f"| {name} | mean of {arguments.seeds} seeds | worst |\n| --- | --- | --- |", flush=True)
     for label, (demonstrations, settings) in variants.items():
+        settings = {"timesteps": arguments.timesteps, "run": {"evaluate_every": 0}, **settings}
         shares = []
         for seed in range(arguments.seeds):
-            run = finished(
-                arguments.work / name / label.replace(" ", "-") / str(seed),
-                demonstrations,
-                **{
-                    "timesteps": arguments.timesteps,
-                    "seed": seed,
-                    "run": {"evaluate_every": 0},  # evaluated below
-                    **settings,
-                },
-            )
-            evaluation = agail.evaluate(run, 20, seed=1000, threads=1)
-            shares.append(evaluation.share_of_demonstrations)
+            folder = arguments.work / name / label.replace(" ", "-") / str(seed)
+            run = finished(folder, demonstrations, seed=seed, **settings)
+            shares.append(agail.evaluate(run, 20, seed=1000, threads=1).share_of_demonstrations)
             rows.append((label, seed, f"{shares[-1]:.4f}"))
         print(f"| {label} | {mean(shares):.0%} | {min(shares):.0%} |", flush=True)
     with (arguments.work / f"{name}.csv").open("w", newline="") as file:
