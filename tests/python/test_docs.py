@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
@@ -253,7 +254,10 @@ def python_names(material, place, monkeypatch):
 
     monkeypatch.setattr(package, "train", short)
     shutil.copy(material / "Hopper-v5.hdf5", place / "my-demos.hdf5")
-    return {**arrays(), "observation": np.zeros(11), "gymnasium": gymnasium}
+    names = {"agail": package, "np": np, "gymnasium": gymnasium, "observation": np.zeros(11)}
+    steps = SimpleNamespace(obs=np.zeros((21, 11)), acts=np.zeros((20, 3)), terminal=True)
+    model = SimpleNamespace(predict=lambda *_, **__: (np.zeros(1), None))
+    return {**names, **arrays(), "trajectories": [steps], "model": model}
 
 
 def check_cpp(block, place):
