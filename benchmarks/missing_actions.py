@@ -75,7 +75,7 @@ def main() -> None:
         collect(arguments.work)
     table = shares()
     write_tables(table)
-    plt.rcParams["svg.hashsalt"] = "agail"
+    plt.rcParams.update({"svg.hashsalt": "agail", "svg.fonttype": "none"})
     figure, axes = plt.subplots(2, 2, figsize=(8, 4.6), sharex=True, layout="constrained")
     for axis, (name, title) in zip(axes.flat, TITLES.items(), strict=True):
         variants = list(table[name])

@@ -35,6 +35,6 @@ if __name__ == "__main__":
         demonstrations = silent(whole, channel, logged=0)
         print(f"{joint}: {demonstrations}")
         variants = {m: (demonstrations, {"method": m}) for m in ["agail", "bc", "bco"]}
-        variants["agail with one whole episode"] = silent(whole, channel, logged=1), {}
+        variants["agail, one whole"] = silent(whole, channel, logged=1), {}
         variants["state-gail"] = whole, {"method": "state-gail"}  # reads no action
         compare(f"dead-{joint}", variants, arguments)
