@@ -15,7 +15,13 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 from measure import ROOT, SEEDS, curve, demonstrated_return, evaluate
 
-COLOURS = {"agail": "#1b6ca8", "gail": "#8f5fb0", "state-gail": "#d9822b", "bc": "#5a8f3c"}
+COLOURS = {
+    "agail": "#1b6ca8",
+    "gail": "#8f5fb0",
+    "state-gail": "#d9822b",
+    "bc": "#5a8f3c",
+    "bco": "#b0413e",
+}
 
 
 def draw(axis: plt.Axes, runs: Path) -> None:

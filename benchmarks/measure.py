@@ -209,6 +209,7 @@ def main() -> None:
             "gail": ("gail", []),
             "state-gail": ("state-gail", []),
             "bc": ("bc", []),
+            "bco": ("bco", []),
         }
         measure_imitation(options.work, options.jobs, "imitation", [10], methods)
     else:
