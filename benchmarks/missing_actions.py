@@ -28,7 +28,13 @@ TITLES = {
     "dead-thigh": "Thigh never logged",
     "motion-capture": "Motion capture",
 }
-COLOURS = {"agail": "#1b6ca8", "gail": "#8f5fb0", "state-gail": "#d9822b", "bc": "#5a8f3c"}
+COLOURS = {
+    "agail": "#1b6ca8",
+    "gail": "#8f5fb0",
+    "state-gail": "#d9822b",
+    "bc": "#5a8f3c",
+    "bco": "#b0413e",
+}
 
 
 def collect(work: Path) -> None:
@@ -81,7 +87,7 @@ def main() -> None:
         variants = list(table[name])
         for row, variant in enumerate(variants):
             seeds = table[name][variant]
-            colour = COLOURS.get(variant.split()[0], "#777777")
+            colour = COLOURS[re.match(r"[a-z-]+", variant)[0]]
             axis.barh(row, mean(seeds), color=colour, alpha=0.45, height=0.7)
             axis.plot(seeds, [row] * len(seeds), "o", color=colour, ms=5)
         axis.set_yticks(range(len(variants)), variants)
