@@ -13,14 +13,13 @@ full method is the same cell of the experiment itself: FULL (default results/tab
 
 import argparse
 import csv
-import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-AGAIL = Path(os.environ.get("AGAIL", ROOT / "build/release/agail"))
+from machine import AGAIL, ROOT
+
 RESULTS = ROOT / "results/table1/ablation"
 MISSING = "0.75"
 OFF = {

@@ -19,7 +19,8 @@ import matplotlib
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
-from measure import ROOT
+from figure import COLOURS
+from machine import ROOT
 
 RESULTS = ROOT / "results/missing_actions.csv"
 TITLES = {
@@ -27,13 +28,6 @@ TITLES = {
     "dead-foot": "Foot never logged",
     "dead-thigh": "Thigh never logged",
     "motion-capture": "Motion capture",
-}
-COLOURS = {
-    "agail": "#1b6ca8",
-    "gail": "#8f5fb0",
-    "state-gail": "#d9822b",
-    "bc": "#5a8f3c",
-    "bco": "#b0413e",
 }
 
 

@@ -14,18 +14,9 @@ JOINTS = {"foot": 2, "thigh": 0}  # Hopper's actions are torques at thigh, leg a
 
 def silent(whole, channel, logged):
     """Without this channel in all episodes but the first `logged`."""
-    actions = []
-    for i, episode in enumerate(whole):
-        known = np.vstack([episode.actions, np.zeros(whole.action_dim)])  # for the last observation
-        known[:, channel] = known[:, channel] if i < logged else np.nan
-        actions.append(known)
-    return agail.Demonstrations.from_arrays(
-        np.concatenate([episode.observations for episode in whole]),
-        np.concatenate(actions),
-        rewards=np.concatenate([np.append(episode.rewards, 0) for episode in whole]),
-        episodes=np.repeat(np.arange(len(whole)), [len(each) for each in actions]),
-        environment="Hopper-v5",
-    )
+    arrays = whole.to_arrays()
+    arrays["actions"][arrays["episodes"] >= logged, channel] = np.nan
+    return agail.Demonstrations.from_arrays(**arrays, environment="Hopper-v5")
 
 
 if __name__ == "__main__":

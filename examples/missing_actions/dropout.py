@@ -22,15 +22,10 @@ def link(steps, random):
 
 def lost(whole, random):
     """The demonstrations as they would be logged: NaN where no command arrived."""
-    pad = [(0, 1), (0, 0)]  # an episode's last observation has no action
-    actions = [np.where(link(len(e), random)[:, None], e.actions, np.nan) for e in whole]
-    return agail.Demonstrations.from_arrays(
-        np.concatenate([episode.observations for episode in whole]),
-        np.concatenate([np.pad(a, pad, constant_values=np.nan) for a in actions]),
-        rewards=np.concatenate([np.pad(episode.rewards, (0, 1)) for episode in whole]),
-        episodes=np.repeat(np.arange(len(whole)), [len(e) + 1 for e in whole]),
-        environment="Hopper-v5",
-    )
+    arrays = whole.to_arrays()
+    arrived = np.concatenate([link(len(episode), random) for episode in whole])
+    arrays["actions"][~arrived] = np.nan
+    return agail.Demonstrations.from_arrays(**arrays, environment="Hopper-v5")
 
 
 if __name__ == "__main__":

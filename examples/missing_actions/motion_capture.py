@@ -18,23 +18,15 @@ STEP = 0.008  # seconds
 
 def captured(whole, complete):
     speed = np.mean([episode.observations[:, FORWARD].mean() for episode in whole[:complete]])
-    observations, actions, rewards = [], [], []
-    for i, episode in enumerate(whole):
-        states, known = episode.observations.copy(), i < complete
-        if not known:
-            states[:, FORWARD] = speed
-            states[:, OTHERS] = np.gradient(states[:, POSITIONS], STEP, axis=0).clip(-10, 10)
-        observations.append(states)
-        last = np.full((1, whole.action_dim), np.nan)  # the last observation has no action
-        actions.append(np.vstack([episode.actions if known else np.nan * episode.actions, last]))
-        rewards.append(np.append(episode.rewards, 0))
-    return agail.Demonstrations.from_arrays(
-        np.concatenate(observations),
-        np.concatenate(actions),
-        rewards=np.concatenate(rewards),
-        episodes=np.repeat(np.arange(len(whole)), [len(each) for each in observations]),
-        environment="Hopper-v5",
-    )
+    observations = [episode.observations.copy() for episode in whole]
+    for states in observations[complete:]:
+        states[:, FORWARD] = speed
+        states[:, OTHERS] = np.gradient(states[:, POSITIONS], STEP, axis=0).clip(-10, 10)
+    arrays = whole.to_arrays()
+    arrays["observations"] = np.concatenate([states[:-1] for states in observations])
+    arrays["next_observations"] = np.concatenate([states[1:] for states in observations])
+    arrays["actions"][arrays["episodes"] >= complete] = np.nan
+    return agail.Demonstrations.from_arrays(**arrays, environment="Hopper-v5")
 
 
 if __name__ == "__main__":

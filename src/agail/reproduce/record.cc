@@ -43,8 +43,7 @@ ordered_json changed_settings(const Settings& settings) {
   return result;
 }
 
-FinalEvaluation evaluate_finally(const fs::path& run_folder) {
-  const SavedPolicy policy = SavedPolicy::load(policy_file(run_folder));
+FinalEvaluation evaluate_finally(const SavedPolicy& policy) {
   ThreadPool pool(1);
   const Evaluation result = evaluate(policy, kEvaluationEpisodes, kEvaluationSeed, false, pool);
   return {kEvaluationEpisodes, result.mean_return(), result.standard_error(),
@@ -131,7 +130,8 @@ void write_run_record(const fs::path& file, const fs::path& run_folder, const Gr
       {"timesteps", summary.at("timesteps")}};
   if (summary.contains("demonstrations")) record["demonstrations"] = summary["demonstrations"];
   record["signature"] = SavedPolicy::load(run_folder / "policy.safetensors").signature();
-  record["final_evaluation"] = to_json(evaluate_finally(run_folder));
+  record["final_evaluation"] =
+      to_json(evaluate_finally(SavedPolicy::load(policy_file(run_folder))));
   record["evaluations"] = evaluations(run_folder, summary);
   record["training"] = training(curve);
   write_file_atomically(file, lines(record));
@@ -140,15 +140,15 @@ void write_run_record(const fs::path& file, const fs::path& run_folder, const Gr
 void write_expert_record(const fs::path& file, const fs::path& run_folder,
                          const std::string& environment, std::uint64_t seed) {
   const ordered_json summary = read_json(run_folder / "summary.json");
-  write_file_atomically(
-      file, lines({{"environment", environment},
-                   {"method", "trpo"},
-                   {"preset", kExpertPreset},
-                   {"seed", seed},
-                   {"timesteps", summary.at("timesteps")},
-                   {"signature", SavedPolicy::load(policy_file(run_folder)).signature()},
-                   {"final_evaluation", to_json(evaluate_finally(run_folder))},
-                   {"evaluations", evaluations(run_folder, summary)}}));
+  const SavedPolicy policy = SavedPolicy::load(policy_file(run_folder));
+  write_file_atomically(file, lines({{"environment", environment},
+                                     {"method", "trpo"},
+                                     {"preset", kExpertPreset},
+                                     {"seed", seed},
+                                     {"timesteps", summary.at("timesteps")},
+                                     {"signature", policy.signature()},
+                                     {"final_evaluation", to_json(evaluate_finally(policy))},
+                                     {"evaluations", evaluations(run_folder, summary)}}));
 }
 
 void write_demonstrations_record(const fs::path& file, const std::vector<ExpertRecord>& candidates,
