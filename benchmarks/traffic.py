@@ -2,6 +2,7 @@
 """What ranks send each other: a model of messages and bytes an update, checked and used to predict.
 
     benchmarks/traffic.py check      runs agail bench on 1-8 ranks of this machine and compares
+    benchmarks/traffic.py check --hosts --mbit 20    the same with a host and a slow cable for each rank; the time, too
     benchmarks/traffic.py predict    messages, bytes and time an update on 16, 256 and 4,096 ranks
 
 The model follows the code: the shares of src/agail/comm/team.h, the collectives of comm/collectives.cc and the tree of
@@ -16,6 +17,7 @@ import os
 import subprocess
 from dataclasses import dataclass, replace
 
+from hosts import Hosts
 from machine import AGAIL
 
 CHUNK = 64
@@ -145,7 +147,7 @@ def update(task, ranks):
         "values and rewards": gather(n, ranks) * (1 + t.reward_sums) + gather(t.lanes, ranks),
         "gradient": tree_sum(n, t.policy_parameters, 4, ranks),
         "conjugate gradients": tree_sum(fisher, t.policy_parameters, 4, ranks)
-        * (t.cg_iterations + 1),
+        * t.cg_iterations,
         "line search": tree_sum(n, 3, 8, ranks) * (1 + t.line_search_tries),
         "value fit": tree_sum(t.value_minibatch, t.value_parameters, 4, ranks) * minibatches,
     }
@@ -155,40 +157,57 @@ def total(parts):
     return sum(parts.values(), Cost())
 
 
-def measured(task, ranks, updates):
-    command = [
-        "mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), str(AGAIL), "bench",
-        "Hopper-v5", "--json", "--updates", str(updates),
+def measured(task, ranks, updates, hosts=None):
+    arguments = [
+        str(AGAIL), "bench", "Hopper-v5", "--json", "--updates", str(updates),
         f"--set=run.batch_steps={task.batch}", f"--set=run.lanes={task.lanes}",
         "--set=discriminator.every=1", f"--set=value.minibatch={task.value_minibatch}",
     ]  # fmt: skip
-    environment = {
-        **os.environ,
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    }
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+    if hosts:
+        launcher, environment = hosts.mpirun(ranks), hosts.environment
+    else:
+        launcher = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks)]
+        environment = {
+            **os.environ,
+            "OMPI_ALLOW_RUN_AS_ROOT": "1",
+            "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        }
+    command = [*launcher, *arguments]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, check=True)
     return json.loads(done.stdout)[0]
+
+
+def measured_on_hosts(task, ranks, updates, mbit):
+    with Hosts(ranks, mbit) as hosts:
+        return measured(task, ranks, updates, hosts)
 
 
 def check(arguments):
     task = Task(batch=arguments.batch, value_minibatch=arguments.value_minibatch)
+    columns = ["ranks", "messages", "measured", "bytes", "measured", "bytes, error", "signature"]
+    if arguments.mbit:
+        columns += ["seconds of the bytes", "measured"]
     print("Messages and bytes an update, all ranks together; model against agail bench.\n")
-    print("| ranks | messages | measured | bytes | measured | bytes, error | signature |")
-    print("| ---: | ---: | ---: | ---: | ---: | ---: | --- |")
+    print("| " + " | ".join(columns) + " |")
+    print("| " + "---: | " * len(columns))
     for ranks in range(1, arguments.ranks + 1):
-        result = measured(task, ranks, arguments.updates)
-        if ranks == 1:
-            print(f"| 1 | 0 | 0 | 0 | 0 | | {result['signature']} |")
-            continue
-        seen = result["traffic_an_update"]
+        if ranks == 1 or not arguments.hosts:
+            result = measured(task, ranks, arguments.updates)
+        else:
+            result = measured_on_hosts(task, ranks, arguments.updates, None)
         ours = total(update(task, ranks))
-        print(
-            f"| {ranks} | {ours.messages:,.0f} | {seen['messages']:,.1f} | {ours.bytes:,.0f} "
-            f"| {seen['bytes']:,.0f} | {100 * (ours.bytes / seen['bytes'] - 1):+.1f} % "
-            f"| {result['signature']} |",
-            flush=True,
-        )
+        seen = result["traffic_an_update"] if ranks > 1 else {"messages": 0, "bytes": 0}
+        error = f"{100 * (ours.bytes / seen['bytes'] - 1):+.1f} %" if ranks > 1 else ""
+        row = [
+            ranks, f"{ours.messages:,.0f}", f"{seen['messages']:,.1f}",
+            f"{ours.bytes:,.0f}", f"{seen['bytes']:,.0f}", error, result["signature"],
+        ]  # fmt: skip
+        if arguments.mbit and ranks > 1:
+            # What the slow cable adds to rank 0's waiting: whatever else it waits for is in both.
+            slow = measured_on_hosts(task, ranks, arguments.updates, arguments.mbit)
+            added = slow["traffic_an_update"]["seconds_of_rank_0"] - seen["seconds_of_rank_0"]
+            row += [f"{ours.critical_bytes * 8 / (arguments.mbit * 1e6):.2f}", f"{added:.2f}"]
+        print("| " + " | ".join(map(str, row)) + " |", flush=True)
 
 
 def seconds(task, ranks, a):
@@ -246,6 +265,8 @@ def main():
     checking.add_argument("--updates", type=int, default=2)
     checking.add_argument("--batch", type=int, default=8192)
     checking.add_argument("--value-minibatch", type=int, default=128)
+    checking.add_argument("--hosts", action="store_true", help="a network namespace for each rank")
+    checking.add_argument("--mbit", type=float, help="what a host can send, Mbit/s")
     predicting = commands.add_parser("predict")
     predicting.set_defaults(run=predict)
     predicting.add_argument("--latency-us", type=float, default=20)
@@ -256,6 +277,8 @@ def main():
     predicting.add_argument("--value-us", type=float, default=5.5)
     predicting.add_argument("--repeated-us", type=float, default=0.3)
     arguments = parser.parse_args()
+    if getattr(arguments, "mbit", None) and not arguments.hosts:
+        parser.error("--mbit needs --hosts")
     arguments.run(arguments)
 
 
