@@ -109,12 +109,12 @@ TEST_P(AgailTest, MissingActionsAreNeverRead) {
       Vector<float> theta = reference::normal_vector(network.parameters(), 1, 0.1).cast<float>();
       BcSettings settings;
       settings.epochs = 3;
-      clone_policy(network, identity, data, {data.actions, data.available, data.some_action},
-                   settings, true, pool, 1, theta);
+      const CloningTargets targets{data.actions, data.available, data.some_action};
+      clone_policy(network, identity, data, targets, settings, true, pool, 1, theta);
       EXPECT_TRUE(theta.allFinite());
       cloned.push_back(theta);
-      CloningTerm term(network, identity, data, {data.actions, data.available, data.some_action},
-                       {.weight = 1, .decay = 1, .minibatch = 64}, pool, 1);
+      CloningTerm term(network, identity, data, targets, {.weight = 1, .decay = 1, .minibatch = 64},
+                       pool, 1);
       term.begin_update(theta);
       Vector<float> gradient = Vector<float>::Zero(theta.size());
       term.add_gradient(theta, gradient);

@@ -82,12 +82,16 @@ TEST_F(BcoTest, LearnsFromStatesAloneWhatTheDemonstratorDid) {
   BehaviorCloningFromObservation bco(network, normalizer, demos, space, settings(), pool, 1);
 
   const Vector<float> before = theta;
-  EXPECT_FALSE(bco.update(own(), 0, theta));
+  CloningTargets targets;
+  EXPECT_FALSE(bco.update(own(), 0, theta, targets));
   EXPECT_EQ(theta, before);  // in the middle of a round
-  const std::optional<BcoReport> report = bco.update(own(), 1, theta);
+  const std::optional<BcoReport> report = bco.update(own(), 1, theta, targets);
   ASSERT_TRUE(report);
   EXPECT_GT(report->inverse_dynamics.quality, 0.98);
   EXPECT_GT(report->cloning.quality, 0.95);
+  EXPECT_EQ(targets.available.minCoeff(), 1);
+  EXPECT_LT((targets.actions + 0.5F * demos.states).squaredNorm(),
+            0.05F * (0.5F * demos.states).squaredNorm());
   EXPECT_FLOAT_EQ(network.log_std(theta.data())[1], -1.5F);
 
   Matrix<float> x = Matrix<float>::Zero(padded(3), demos.size());

@@ -92,8 +92,8 @@ TEST(CloningTerm, ValueAndGradientOfTheWeightedLogLikelihood) {
       settings.weight = 0.8;
       settings.decay = 0.5;
       settings.minibatch = 100;
-      CloningTerm term(network, normalizer, demos, {demos.actions, demos.available, {column}},
-                       settings, pool, 1);
+      const CloningTargets targets{demos.actions, demos.available, {column}};
+      CloningTerm term(network, normalizer, demos, targets, settings, pool, 1);
       for (const double weight : {0.8, 0.4, 0.2}) {
         term.begin_update(theta);
         const auto f = [&](const auto& at) {

@@ -142,6 +142,38 @@ TEST_P(TrainerTest, ContinuesFromAnArchive) {
   }
 }
 
+TEST(ExploringStart, OwnTransitionsTellADimensionThatNoDemonstrationTells) {
+  TrainingTask t = task("Hopper-v5", "agail");
+  t.settings.start.method = "clone-inferred";
+  t.settings.start.value_warmup = 1;
+  t.settings.clone.weight = 0.1;
+  t.demonstrations = random_demonstrations("Hopper-v5", 15, 3);
+  remove_actions(*t.demonstrations,
+                 {.pattern = MaskPattern::kDimension, .ratio = 0.34, .seed = 4, .dimension = 1});
+  Trainer whole(t);
+  std::vector<TensorStore> stores;
+  std::int64_t rounds = 0;
+  int first_step = -1;
+  constexpr int kUpdates = 16;
+  for (int i = 0; i < kUpdates; ++i) {
+    stores.push_back(archived(whole));
+    const UpdateReport report = whole.update();
+    rounds += report.bco.has_value() ? 1 : 0;
+    EXPECT_EQ(report.bco.has_value(), first_step < 0 && i % 2 == 1 && i < 12) << i;
+    if (report.trpo && first_step < 0) first_step = i;
+    EXPECT_EQ(report.clone_log_likelihood.has_value(), report.trpo.has_value());
+  }
+  EXPECT_EQ(rounds, 6);
+  EXPECT_EQ(first_step, 13);  // after the rounds and the value network's own update
+  for (const int from : {3, 12, 14}) {
+    Trainer resumed(t);
+    Archive load(stores[static_cast<std::size_t>(from)], Archive::Mode::kLoad);
+    resumed.archive(load);
+    for (int i = from; i < kUpdates; ++i) resumed.update();
+    EXPECT_TRUE(same_store(archived(whole), archived(resumed))) << from;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Environments, TrainerTest, testing::Values("CartPole-v1", "Hopper-v5"),
                          [](const auto& test) {
                            return test.param.substr(0, test.param.find('-'));

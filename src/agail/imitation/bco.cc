@@ -73,12 +73,12 @@ RegressionReport BehaviorCloningFromObservation::learn_inverse_dynamics(std::uin
 
 std::optional<BcoReport> BehaviorCloningFromObservation::update(const Batch& batch,
                                                                 std::uint32_t update,
-                                                                Vector<float>& theta) {
+                                                                Vector<float>& theta,
+                                                                CloningTargets& targets) {
   keep(batch);
   const auto every = static_cast<std::uint32_t>(settings_.bco.every);
   if ((update + 1) % every != 0) return std::nullopt;
   const std::uint32_t round = (update + 1) / every;
-  CloningTargets targets;
   targets.columns.resize(static_cast<std::size_t>(demos_.size()));
   std::iota(targets.columns.begin(), targets.columns.end(), Index{0});
   BcoReport report;

@@ -23,10 +23,11 @@ class BehaviorCloningFromObservation {
                                  const DemoData& demos, const ActionSpace& action,
                                  const Settings& settings, ThreadPool& pool, std::uint64_t seed);
 
-  // Keeps the batch's transitions. At the end of a round fits inverse dynamics and then theta, both
-  // from where they are; continuous actions explore with start.log_std from then on. `update`
-  // numbers the batches from 0.
-  std::optional<BcoReport> update(const Batch& batch, std::uint32_t update, Vector<float>& theta);
+  // Keeps the batch's transitions. At the end of a round fits inverse dynamics, fills in `targets`
+  // and fits theta to them, networks from where they are; continuous actions explore with
+  // start.log_std from then on. `update` numbers the batches from 0.
+  std::optional<BcoReport> update(const Batch& batch, std::uint32_t update, Vector<float>& theta,
+                                  CloningTargets& targets);
 
   void archive(Archive& a);
 

@@ -41,12 +41,12 @@ RegressionReport clone_policy(const PolicyNetwork<float>& network, const Normali
 }
 
 CloningTerm::CloningTerm(const PolicyNetwork<float>& network, const Normalizer& normalizer,
-                         const DemoData& demos, CloningTargets targets,
+                         const DemoData& demos, const CloningTargets& targets,
                          const CloneSettings& settings, ThreadPool& pool, std::uint64_t seed)
     : network_(network),
       normalizer_(normalizer),
       demos_(demos),
-      targets_(std::move(targets)),
+      targets_(targets),
       settings_(settings),
       pool_(pool),
       seed_(seed),

@@ -28,8 +28,9 @@ RegressionReport clone_policy(const PolicyNetwork<float>& network, const Normali
 // update k.
 class CloningTerm : public AuxiliaryTerm {
  public:
+  // Demonstrations and targets are read at every update, too.
   CloningTerm(const PolicyNetwork<float>& network, const Normalizer& normalizer,
-              const DemoData& demos, CloningTargets targets, const CloneSettings& settings,
+              const DemoData& demos, const CloningTargets& targets, const CloneSettings& settings,
               ThreadPool& pool, std::uint64_t seed);
 
   void begin_update(const Vector<float>& theta) override;
@@ -43,7 +44,7 @@ class CloningTerm : public AuxiliaryTerm {
   const PolicyNetwork<float>& network_;
   const Normalizer& normalizer_;
   const DemoData& demos_;
-  CloningTargets targets_;
+  const CloningTargets& targets_;
   CloneSettings settings_;
   ThreadPool& pool_;
   std::uint64_t seed_;

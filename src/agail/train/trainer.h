@@ -1,6 +1,7 @@
 // The one training loop. Methods differ in where the reward comes from (environment | discriminator
 // | discriminator and guide), in how the policy starts, and in a cloning term of its objective; bco
-// clones instead of taking policy steps.
+// clones instead of taking policy steps, as agail does at first where a dimension of the actions is
+// known nowhere.
 #pragma once
 
 #include <memory>
@@ -102,8 +103,10 @@ class Trainer {
   AdvantageEstimator advantage_;
   Trpo trpo_;
   std::unique_ptr<AdversarialReward> reward_;
+  CloningTargets targets_;
   std::unique_ptr<CloningTerm> cloning_term_;
-  std::unique_ptr<BehaviorCloningFromObservation> bco_;
+  std::unique_ptr<BehaviorCloningFromObservation> bco_;  // of method bco, or while exploring
+  std::optional<std::int64_t> exploring_rounds_;         // left; absent: the start does not explore
   std::optional<RegressionReport> cloning_, inverse_dynamics_;
   Vector<float> rewards_;
   Stopwatch stopwatch_;
