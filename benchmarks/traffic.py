@@ -146,8 +146,7 @@ def update(task, ranks):
         "batch": allgather(batch, ranks),
         "values and rewards": gather(n, ranks) * (1 + t.reward_sums) + gather(t.lanes, ranks),
         "gradient": tree_sum(n, t.policy_parameters, 4, ranks),
-        "conjugate gradients": tree_sum(fisher, t.policy_parameters, 4, ranks)
-        * t.cg_iterations,
+        "conjugate gradients": tree_sum(fisher, t.policy_parameters, 4, ranks) * t.cg_iterations,
         "line search": tree_sum(n, 3, 8, ranks) * (1 + t.line_search_tries),
         "value fit": tree_sum(t.value_minibatch, t.value_parameters, 4, ranks) * minibatches,
     }
