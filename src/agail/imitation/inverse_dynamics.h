@@ -53,8 +53,8 @@ class InverseDynamics {
 
 // Learns from demos.some_action and fills missing entries of `actions` in place (within the
 // action's bounds); `available` becomes 1 where an entry is known or was filled. Known entries stay
-// as they are. A dimension that no demonstration tells stays missing: there is nothing here to infer
-// it from.
+// as they are. A dimension that no demonstration tells stays missing: there is nothing here to
+// infer it from.
 RegressionReport infer_missing_actions(const DemoData& demos, const ActionSpace& action,
                                        const InverseDynamicsSettings& settings, double clip,
                                        ThreadPool& pool, std::uint64_t seed, Matrix<float>& actions,
