@@ -3,6 +3,7 @@
 
     benchmarks/table1_figures.py DIR                        writes DIR/figure2.svg, .png and DIR/figure3.svg, .png
     benchmarks/table1_figures.py DIR --methods docs/figures  the curves of each method besides, for its page: curve-METHOD.svg
+    benchmarks/table1_figures.py DIR --tables FILE.md ...    and the table between the marks <!-- table1 --> of each file
 
 Figure 2: smoothed return of the training episodes against environment steps, mean over the seeds and its standard error;
 left ours, right the paper's. Figure 3: the return at the end of that against the share of missing actions, TRPO and
@@ -12,6 +13,7 @@ GAIL as horizontal lines. The paper's MuJoCo environments were the older v2.
 import argparse
 import csv
 import json
+import re
 from pathlib import Path
 
 import matplotlib
@@ -158,12 +160,40 @@ def figure3(table: list[dict], environments: list[str]) -> plt.Figure:
     return figure
 
 
+def markdown_table(table: list[dict], ours: dict, environments: list[str]) -> str:
+    """The paper's statistic, ours and in brackets the paper's; an environment of fewer than six seeds says so."""
+
+    def heading(environment: str) -> str:
+        seeds = min(len(ours.get((environment, label), ((), ()))[1]) for label in COLOURS)
+        return environment if seeds == 6 else f"{environment}, {seeds} seeds"
+
+    def cell(environment: str, label: str) -> str:
+        for row in table:
+            missing = float(row["missing"]) if row["missing"] else None
+            if (row["environment"], name_of(row["method"], missing)) == (environment, label):
+                form = ",.1f" if environment.startswith("CartPole") else ",.0f"
+                values = row["mean"], row["standard_error"], row["paper_mean"]
+                return "{} ± {} ({})".format(*(format(float(v), form) for v in values))
+        return ""
+
+    names = {"GAIL": "GAIL, all actions", "state-GAIL": "state-GAIL, no actions"}
+    for label in COLOURS:
+        if label.startswith("AGAIL"):
+            share = int(label[-2:])
+            names[label] = f"**AGAIL**, {f'{share} % missing' if share else 'all actions'}"
+    rows = [["", *map(heading, environments)], ["---"] * (len(environments) + 1)]
+    for label in COLOURS:
+        rows.append([names.get(label, label), *(cell(e, label) for e in environments)])
+    return "\n".join(f"| {' | '.join(row)} |".replace("|  |", "| |") for row in rows)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", type=Path, help="the --out of agail reproduce table1")
     parser.add_argument("--methods", type=Path, metavar="DIR", help="curves of each method, too")
+    parser.add_argument("--tables", type=Path, nargs="+", default=[], metavar="FILE")
     options = parser.parse_args()
     folder = options.folder
     if not (folder / "table.csv").exists():
@@ -185,6 +215,18 @@ def main() -> None:
             file = options.methods / f"curve-{method}.svg"
             method_figure(ours, environments, labels).savefig(file, metadata={"Date": None})
             print(file)
+    for file in options.tables:
+        text = file.read_text()
+        filled, count = re.subn(
+            r"(<!-- table1 -->\n).*?(\n<!-- end -->)",
+            lambda m: m[1] + markdown_table(table, ours, environments) + m[2],
+            text,
+            flags=re.S,
+        )
+        if count != 1:
+            parser.error(f"{file}: expected the mark <!-- table1 --> once, found it {count} times")
+        file.write_text(filled)
+        print(file)
 
 
 if __name__ == "__main__":

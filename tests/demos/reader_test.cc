@@ -188,7 +188,16 @@ TEST(Reader, RefusesWhatDoesNotFit) {
                 p.actions[2] = kNaN;
               }),
               HasSubstr("step 1, where the action is NaN"));
-  EXPECT_THAT(broken([](Plain& p) { p.group = "trajectory_0"; }), HasSubstr("no episodes"));
+  EXPECT_THAT(broken([](Plain& p) { p.group = "trajectory_0"; }),
+              AllOf(HasSubstr("no episodes"), Not(HasSubstr("D4RL"))));
+  EXPECT_THAT(broken([](Plain& p) {
+                p.group = "infos";
+                p.root = [](Group& r) {
+                  const std::vector<double> flat(8, 0.5);
+                  r.write("observations", {4, 2}, Type::kFloat64, flat.data());
+                };
+              }),
+              HasSubstr("from_d4rl()"));
   EXPECT_THAT(broken([](Plain& p) {
                 p.root = [](Group& r) { r.write_attribute("total_episodes", std::int64_t{3}); };
               }),

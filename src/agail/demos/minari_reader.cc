@@ -153,8 +153,13 @@ void check_memory(const hdf5::Group& root, const std::vector<std::string>& names
 
 Demonstrations read(const hdf5::Group& root, const json& metadata, const std::string& where) {
   const std::vector<std::string> names = episode_names(root);
-  if (names.empty())
-    throw InputError(root.where() + " holds no episodes (groups episode_0, episode_1, ...)");
+  if (names.empty()) {
+    const bool flat = root.kind("observations") == hdf5::Kind::kDataset;
+    throw InputError(root.where() + " holds no episodes (groups episode_0, episode_1, ...)" +
+                     (flat ? ", but one array of observations, as D4RL's files do; "
+                             "agail.Demonstrations.from_d4rl() in Python reads those"
+                           : ""));
+  }
   if (metadata.contains("total_episodes") && metadata["total_episodes"] != names.size())
     throw InputError(where + " says there are " + metadata["total_episodes"].dump() +
                      " episodes, the file holds " + std::to_string(names.size()) +
