@@ -39,7 +39,9 @@ def missing() -> str:
         if not shutil.which(program):
             return f"no {program}"
     try:
-        with Hosts(1):
+        with Hosts(1) as hosts:
+            enter = ["ip", "netns", "exec", hosts.names[0], "unshare", "--uts", "hostname", "agail"]
+            subprocess.run(enter, check=True, capture_output=True, text=True)
             return ""
     except subprocess.CalledProcessError as error:
         return f"no network namespaces: {error.stderr.strip()}"
