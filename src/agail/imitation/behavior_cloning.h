@@ -28,7 +28,8 @@ RegressionReport clone_policy(const PolicyNetwork<float>& network, const Normali
 // update k.
 class CloningTerm : public AuxiliaryTerm {
  public:
-  // Demonstrations and targets are read at every update, too.
+  // Network, normaliser, demonstrations and targets stay with the caller, and may change in
+  // between.
   CloningTerm(const PolicyNetwork<float>& network, const Normalizer& normalizer,
               const DemoData& demos, const CloningTargets& targets, const CloneSettings& settings,
               ThreadPool& pool, std::uint64_t seed);
