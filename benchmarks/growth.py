@@ -27,7 +27,7 @@ from datetime import date
 from pathlib import Path
 from statistics import median
 
-from machine import AGAIL, ROOT, Kept, cpu_model
+from machine import AGAIL, ROOT, Kept, cpu_model, fill
 
 PAGE = ROOT / "docs/performance.md"
 COLUMNS = ["part", "variant", "x", "size", "stepping_us", "training_us", "learning_us"]
@@ -271,15 +271,6 @@ def text_of(part: str, rows: list[dict]) -> str:
     return table(rows, {"x": part} | costs | {"gain": "times one"})
 
 
-def replace_part(page: Path, part: str, text: str) -> None:
-    """What stands between <!-- growth PART --> and <!-- end -->."""
-    whole = page.read_text()
-    begin = f"<!-- growth {part} -->\n"
-    before, rest = whole.split(begin)
-    after = rest[rest.index("<!-- end -->") :]
-    page.write_text(f"{before}{begin}{text}\n{after}")
-
-
 def write_csv(path: Path, rows: list[dict], parts: list[str]) -> None:
     """Parts that were not measured now stay as they are."""
     if path.exists():
@@ -325,7 +316,7 @@ def main() -> None:
         rows += found
         text = f"{about}\n\n{text_of(part, found)}"
         print(f"\n{part}\n{text}\n", flush=True)
-        replace_part(PAGE, part, text)
+        fill(PAGE, f"growth {part}", text)
     write_csv(ROOT / "results/growth.csv", rows, parts)
 
 

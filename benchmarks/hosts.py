@@ -29,8 +29,17 @@ KEEPALIVE = {
 }
 
 
+def run(*command: str) -> None:
+    subprocess.run(command, check=True, capture_output=True, text=True)
+
+
 def ip(*arguments: str) -> None:
-    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
+    run("ip", *arguments)
+
+
+def inside(host: str) -> list[str]:
+    """The beginning of a command that runs on the host."""
+    return ["ip", "netns", "exec", host]
 
 
 def missing() -> str:
@@ -40,8 +49,7 @@ def missing() -> str:
             return f"no {program}"
     try:
         with Hosts(1) as hosts:
-            enter = ["ip", "netns", "exec", hosts.names[0], "unshare", "--uts", "hostname", "agail"]
-            subprocess.run(enter, check=True, capture_output=True, text=True)
+            run(*inside(hosts.names[0]), "unshare", "--uts", "hostname", "agail")
             return ""
     except subprocess.CalledProcessError as error:
         return f"no network namespaces: {error.stderr.strip()}"
@@ -58,8 +66,6 @@ class Hosts:
         self.environment = {
             **os.environ,
             **KEEPALIVE,
-            "OMPI_ALLOW_RUN_AS_ROOT": "1",
-            "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
             "OMPI_MCA_btl": "self,vader,tcp",
             "OMPI_MCA_btl_tcp_if_include": "eth0",
             "OMPI_MCA_oob_tcp_if_include": "eth0",
@@ -93,9 +99,7 @@ class Hosts:
                 frames = ["gso_max_size", "1500", "gso_max_segs", "1"]
                 ip("-n", host, "link", "set", "eth0", *frames)
                 limit = ["rate", f"{self.mbit}mbit", "burst", "10kb", "limit", "10mb"]
-                enter = ["ip", "netns", "exec", host]
-                qdisc = ["tc", "qdisc", "add", "dev", "eth0", "root", "tbf", *limit]
-                subprocess.run([*enter, *qdisc], check=True, capture_output=True, text=True)
+                run(*inside(host), "tc", "qdisc", "add", "dev", "eth0", "root", "tbf", *limit)
             ip("-n", host, "link", "set", "lo", "up")
             ip("-n", host, "link", "set", "eth0", "up")
 
@@ -109,9 +113,9 @@ class Hosts:
         slots = -(-ranks // len(self.names))
         places = ",".join(f"{name}:{slots}" for name in self.names)
         return [
-            "ip", "netns", "exec", self.names[0],
+            *inside(self.names[0]),
             "unshare", "--uts", "sh", "-c", 'hostname "$0"; exec "$@"', self.names[0],
-            "mpirun", "--host", places, "--bind-to", "none", "-n", str(ranks),
+            "mpirun", "--allow-run-as-root", "--host", places, "--bind-to", "none", "-n", str(ranks),
         ]  # fmt: skip
 
     def cut(self, host: int) -> None:

@@ -1,4 +1,4 @@
-"""What benchmarks share: the machine and the build that they measure, and measurements that are kept."""
+"""What benchmarks share: the machine and the build that they measure, measurements that are kept, tables in documents."""
 
 import hashlib
 import json
@@ -15,6 +15,16 @@ def cpu_model() -> str:
         if line.startswith("model name"):
             return line.split(":")[1].strip()
     return platform.processor()
+
+
+def fill(page: Path, mark: str, content: str) -> None:
+    """Replaces what stands between <!-- MARK --> and the next <!-- end -->."""
+    begin = f"<!-- {mark} -->\n"
+    before, found, rest = page.read_text().partition(begin)
+    _, end, after = rest.partition("<!-- end -->")
+    if not (found and end):
+        raise SystemExit(f"{page}: no place marked {begin.strip()} ... <!-- end -->")
+    page.write_text(f"{before}{begin}{content}\n{end}{after}")
 
 
 class Kept(dict):

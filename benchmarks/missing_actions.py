@@ -20,7 +20,7 @@ import matplotlib
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 from figure import COLOURS
-from machine import ROOT
+from machine import ROOT, fill
 
 RESULTS = ROOT / "results/missing_actions.csv"
 TITLES = {
@@ -52,17 +52,12 @@ def shares() -> dict[str, dict[str, list[float]]]:
 
 
 def write_tables(table: dict[str, dict[str, list[float]]]) -> None:
-    page = ROOT / "docs/missing-actions.md"
-
-    def rows(match: re.Match) -> str:
+    for pattern, variants in table.items():
         lines = ["| | mean | worst | each seed |", "| --- | --- | --- | --- |"]
-        for variant, seeds in table[match[1]].items():
+        for variant, seeds in variants.items():
             each = ", ".join(f"{share:.0%}" for share in seeds)
             lines.append(f"| {variant} | {mean(seeds):.0%} | {min(seeds):.0%} | {each} |")
-        return "\n".join([f"<!-- measured {match[1]} -->", *lines, "<!-- end -->"])
-
-    marked = re.compile(r"<!-- measured (\S+) -->\n.*?<!-- end -->", re.DOTALL)
-    page.write_text(marked.sub(rows, page.read_text()))
+        fill(ROOT / "docs/missing-actions.md", f"measured {pattern}", "\n".join(lines))
 
 
 def main() -> None:

@@ -13,7 +13,6 @@ GAIL as horizontal lines. The paper's MuJoCo environments were the older v2.
 import argparse
 import csv
 import json
-import re
 from pathlib import Path
 
 import matplotlib
@@ -21,8 +20,8 @@ import matplotlib
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import numpy as np
+from machine import ROOT, fill
 
-ROOT = Path(__file__).resolve().parent.parent
 PAPER = ROOT / "results" / "paper"
 ENVIRONMENTS = {  # ours: the paper's name
     "CartPole-v0": "CartPole",
@@ -216,16 +215,7 @@ def main() -> None:
             method_figure(ours, environments, labels).savefig(file, metadata={"Date": None})
             print(file)
     for file in options.tables:
-        text = file.read_text()
-        filled, count = re.subn(
-            r"(<!-- table1 -->\n).*?(\n<!-- end -->)",
-            lambda m: m[1] + markdown_table(table, ours, environments) + m[2],
-            text,
-            flags=re.S,
-        )
-        if count != 1:
-            parser.error(f"{file}: expected the mark <!-- table1 --> once, found it {count} times")
-        file.write_text(filled)
+        fill(file, "table1", markdown_table(table, ours, environments))
         print(file)
 
 

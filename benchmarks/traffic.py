@@ -13,7 +13,6 @@ the tries of the line search.
 import argparse
 import json
 import math
-import os
 import subprocess
 from dataclasses import dataclass, replace
 
@@ -165,12 +164,8 @@ def measured(task, ranks, updates, hosts=None):
     if hosts:
         launcher, environment = hosts.mpirun(ranks), hosts.environment
     else:
-        launcher = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks)]
-        environment = {
-            **os.environ,
-            "OMPI_ALLOW_RUN_AS_ROOT": "1",
-            "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-        }
+        launcher = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none"]
+        launcher, environment = [*launcher, "-n", str(ranks)], None
     command = [*launcher, *arguments]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, check=True)
     return json.loads(done.stdout)[0]

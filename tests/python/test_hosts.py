@@ -1,27 +1,21 @@
 """Ranks on several hosts, which are network namespaces of this machine: the same bits, and what becomes of a cut cable."""
 
-import importlib.util
 import subprocess
 import time
-from pathlib import Path
 
 import pytest
+from hosts import Hosts, missing
 from test_ranks import WIDE, has_mpi
 from test_runs import assert_same_result, progress, train, wait_for_rows
-
-FILE = Path(__file__).parents[2] / "benchmarks/hosts.py"
-SPECIFICATION = importlib.util.spec_from_file_location("hosts", FILE)
-hosts_of_one_machine = importlib.util.module_from_spec(SPECIFICATION)
-SPECIFICATION.loader.exec_module(hosts_of_one_machine)
 
 
 @pytest.fixture
 def hosts():
     if not has_mpi():
         pytest.skip("built without MPI")
-    if reason := hosts_of_one_machine.missing():
+    if reason := missing():
         pytest.skip(reason)
-    with hosts_of_one_machine.Hosts(3) as found:
+    with Hosts(3) as found:
         yield found
 
 

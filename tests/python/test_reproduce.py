@@ -168,13 +168,14 @@ def with_returns(grid, out, returns):
 
 
 def test_intervals_are_rliables(agail, grid, tmp_path):
-    # Of fewer runs there are so few resamples that an interval's end jumps between them.
-    returns = np.random.default_rng(3).gamma(3, 20, size=(12, 2)).round(3)
+    returns = np.random.default_rng(3).gamma(3, 20, size=(6, 2)).round(3)
     with_returns(grid, tmp_path, returns.tolist())
     agail("reproduce", "table1", "--out", tmp_path, "--only-tables")
 
     def expected(scores):
-        np.random.seed(0)  # what rliable draws from, whatever random_state it is given
+        # What rliable draws from, whatever random_state it is given. Six runs have so few different
+        # resamples that an interval's end could jump from one to the next with the draw.
+        np.random.seed(0)
         point, interval = library.get_interval_estimates(
             {"agail": scores},
             lambda s: np.array([metrics.aggregate_iqm(s)]),

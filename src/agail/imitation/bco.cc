@@ -14,10 +14,6 @@ Matrix<float> beside(const Matrix<float>& left, const Matrix<float>& right, Inde
   return both;
 }
 
-std::span<float> all_of(Matrix<float>& matrix) {
-  return {matrix.data(), static_cast<std::size_t>(matrix.size())};
-}
-
 }  // namespace
 
 BehaviorCloningFromObservation::BehaviorCloningFromObservation(

@@ -210,7 +210,7 @@ void Discriminator::rewards(const Samples& policy, Vector<float>& rewards) {
 }
 
 void Discriminator::archive(Archive& a) {
-  a("theta", std::span<float>(theta_.data(), static_cast<std::size_t>(theta_.size())));
+  a("theta", all_of(theta_));
   a.scope("adam", [&](Archive& inner) { adam_.archive(inner); });
   a.scope("normalizer", [&](Archive& inner) { normalizer_.archive(inner); });
 }

@@ -314,7 +314,7 @@ double Guide::action_variance_share(const PolicyView& policy, const Matrix<float
 }
 
 void Guide::archive(Archive& a) {
-  a("theta", std::span<float>(theta_.data(), static_cast<std::size_t>(theta_.size())));
+  a("theta", all_of(theta_));
   a.scope("adam", [&](Archive& inner) { adam_.archive(inner); });
 }
 

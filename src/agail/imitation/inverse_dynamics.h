@@ -31,9 +31,7 @@ class InverseDynamics {
   void infer(const Transitions& data, Index n, const Vector<float>& known, ThreadPool& pool,
              Matrix<float>& actions, Matrix<float>& available) const;
 
-  void archive(Archive& a) {
-    a("theta", std::span<float>(theta_.data(), static_cast<std::size_t>(theta_.size())));
-  }
+  void archive(Archive& a) { a("theta", all_of(theta_)); }
 
  private:
   // The network sees s and s' - s, each in units of its own deviation: the difference is what an

@@ -38,8 +38,8 @@ class Adam {
   }
 
   void archive(Archive& a) requires std::same_as<S, float> {
-    a("first_moment", std::span<float>(first_.data(), static_cast<std::size_t>(first_.size())));
-    a("second_moment", std::span<float>(second_.data(), static_cast<std::size_t>(second_.size())));
+    a("first_moment", all_of(first_));
+    a("second_moment", all_of(second_));
     a("step", step_);
   }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 
 namespace agail {
 
@@ -19,6 +20,12 @@ template <class S>
 using View = Eigen::Ref<Matrix<S>, 0, Eigen::OuterStride<>>;
 template <class S>
 using ConstView = Eigen::Ref<const Matrix<S>, 0, Eigen::OuterStride<>>;
+
+// All numbers of a matrix, column by column.
+template <class S, int columns>
+std::span<S> all_of(Eigen::Matrix<S, Eigen::Dynamic, columns>& matrix) {
+  return {matrix.data(), static_cast<std::size_t>(matrix.size())};
+}
 
 // Learning works on chunks of this many samples; their sums are added along a fixed tree
 // (chunks.h).

@@ -88,7 +88,7 @@ void ValueFunction::fit(const Matrix<float>& x, const Vector<float>& targets, In
 }
 
 void ValueFunction::archive(Archive& a) {
-  a("theta", std::span<float>(theta_.data(), static_cast<std::size_t>(theta_.size())));
+  a("theta", all_of(theta_));
   a("mean", mean_);
   a("std", std_);
   a("count", count_);

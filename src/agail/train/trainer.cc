@@ -233,7 +233,7 @@ SavedPolicy Trainer::policy() const {
 }
 
 void Trainer::archive(Archive& a) {
-  a("theta", std::span<float>(theta_.data(), static_cast<std::size_t>(theta_.size())));
+  a("theta", all_of(theta_));
   a("timesteps", timesteps_);
   a("updates", updates_);
   a("episodes", episodes_);
@@ -246,12 +246,9 @@ void Trainer::archive(Archive& a) {
   a.scope("lane", [&](Archive& inner) { collector_.archive(inner); });
   if (reward_) a.scope("reward", [&](Archive& inner) { reward_->archive(inner); });
   if (exploring_rounds_) {
-    const auto matrix = [&](const char* name, Matrix<float>& m) {
-      a(name, std::span<float>(m.data(), static_cast<std::size_t>(m.size())));
-    };
     a("exploring_rounds", *exploring_rounds_);
-    matrix("target_actions", targets_.actions);
-    matrix("target_available", targets_.available);
+    a("target_actions", all_of(targets_.actions));
+    a("target_available", all_of(targets_.available));
     if (exploring_rounds_ == 0) bco_.reset();
   }
   if (bco_) a.scope("bco", [&](Archive& inner) { bco_->archive(inner); });
