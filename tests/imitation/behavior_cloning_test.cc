@@ -119,5 +119,26 @@ TEST(CloningTerm, ValueAndGradientOfTheWeightedLogLikelihood) {
   }
 }
 
+TEST(CloningTerm, TellsTheLikelihoodWhenItsWeightHasGone) {
+  const ActionSpace space = continuous_actions(2);
+  const Index n = 4;
+  const DemoData demos(demonstrations_from(reference::normal_matrix(3, n + 1, 1),
+                                           random_actions(space, n, 2), space));
+  const PolicyNetwork<float> network(3, {6}, space);
+  const Normalizer normalizer(3, false, 5);
+  const Vector<float> theta = reference::normal_vector(network.parameters(), 3, 0.5).cast<float>();
+  const CloningTargets targets{demos.actions, demos.available, {0, 1, 2, 3}};
+  ThreadPool pool(1);
+  const auto after_two_updates = [&](double decay) {
+    CloningTerm term(network, normalizer, demos, targets,
+                     {.weight = 1, .decay = decay, .minibatch = 8}, pool, 1);
+    for (int update = 0; update < 2; ++update) term.begin_update(theta);
+    return std::pair(term.log_likelihood(), term.value(theta));
+  };
+  const auto [kept, value] = after_two_updates(1);
+  EXPECT_DOUBLE_EQ(value, kept);
+  EXPECT_EQ(after_two_updates(0), std::pair(kept, 0.0));
+}
+
 }  // namespace
 }  // namespace agail

@@ -20,6 +20,18 @@ TEST(DemoData, TheNextStateOfALastStepIsTheEpisodesLastObservation) {
   EXPECT_EQ(column, data.size());
 }
 
+TEST(DemoData, ActionsAreThoseThatTheEnvironmentExecutes) {
+  Demonstrations demonstrations = random_demonstrations("Hopper-v5", 1, 1);
+  DemoEpisode& episode = demonstrations.episodes.front();
+  episode.actions.row(0) << 3.0, -0.25, -1.5;
+  episode.available.row(0).setOnes();
+  episode.actions.row(1).setConstant(7.0);
+  episode.available.row(1).setZero();
+  const DemoData data(demonstrations);
+  EXPECT_EQ(data.actions.col(0), Eigen::Vector3f(1.0F, -0.25F, -1.0F));
+  EXPECT_EQ(data.actions.col(1), Eigen::Vector3f::Zero());
+}
+
 TEST(DemoData, SaysHowLargeItWillBe) {
   const Demonstrations demonstrations = random_demonstrations("Hopper-v5", 3, 1);
   const DemoData data(demonstrations);

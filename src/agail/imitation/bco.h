@@ -12,7 +12,8 @@
 
 namespace agail {
 
-// What the two fits of a round were worth, on what they had not seen.
+// What the two fits of a round were worth, on steps that this round held out. Rounds draw them
+// anew, and a fit goes on from the last one's, so from the second round on they are no strangers.
 struct BcoReport {
   RegressionReport inverse_dynamics, cloning;
 };

@@ -18,18 +18,21 @@ RegressionReport clone_policy(const PolicyNetwork<float>& network, const Normali
   const RegressionReport report =
       fit_actions(network, theta, x, targets.actions, targets.available, targets.columns,
                   regression, pool, seed, Purpose::kClone);
-  if (!fit_log_std) return report;
+  if (!fit_log_std || network.distribution.log_stds() == 0) return report;
 
-  Tape<float> tape = network.mlp.make_tape(demos.size());
-  for_each_chunk(pool, demos.size(), [&](int, Index first, Index count) {
-    network.mlp.forward(theta.data(), x.block(0, first, network.mlp.inputs() + 1, count), tape,
-                        first);
+  Matrix<float> means(network.mlp.outputs(), demos.size());
+  std::vector<Tape<float>> tapes;  // one of all steps would be many times the demonstrations' size
+  for (int i = 0; i < pool.threads(); ++i) tapes.push_back(network.mlp.make_tape(kChunk));
+  for_each_chunk(pool, demos.size(), [&](int worker, Index first, Index count) {
+    Tape<float>& tape = tapes[static_cast<std::size_t>(worker)];
+    network.mlp.forward(theta.data(), x.block(0, first, network.mlp.inputs() + 1, count), tape, 0);
+    means.middleCols(first, count) = network.mlp.output(tape, 0, count);
   });
   for (Index i = 0; i < network.distribution.log_stds(); ++i) {
     double squares = 0, count = 0;
     for (const Index j : targets.columns) {
       if (targets.available(i, j) == 0) continue;
-      const auto error = static_cast<double>(targets.actions(i, j) - tape.outputs.back()(i, j));
+      const auto error = static_cast<double>(targets.actions(i, j) - means(i, j));
       squares += error * error;
       count += 1;
     }
@@ -71,10 +74,14 @@ void CloningTerm::begin_update(const Vector<float>& theta) {
     actions_.col(j) = targets_.actions.col(column);
     available_.col(j) = targets_.available.col(column);
   }
-  log_likelihood_ = weight_ > 0 ? value(theta) / weight_ : 0;
+  log_likelihood_ = total_log_likelihood(theta) / static_cast<double>(x_.cols());
 }
 
 double CloningTerm::value(const Vector<float>& theta) {
+  return weight_ * total_log_likelihood(theta) / static_cast<double>(x_.cols());
+}
+
+double CloningTerm::total_log_likelihood(const Vector<float>& theta) {
   const auto& mlp = network_.mlp;
   const Index n = x_.cols();
   const auto total =
@@ -88,7 +95,7 @@ double CloningTerm::value(const Vector<float>& theta) {
         out[0] = 0;
         for (Index j = 0; j < count; ++j) out[0] += static_cast<double>(row[j]);
       });
-  return weight_ * total[0] / static_cast<double>(n);
+  return total[0];
 }
 
 void CloningTerm::add_gradient(const Vector<float>& theta, Vector<float>& gradient) {

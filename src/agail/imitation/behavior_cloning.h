@@ -42,6 +42,8 @@ class CloningTerm : public AuxiliaryTerm {
   void archive(Archive& a) { a("update", update_); }
 
  private:
+  double total_log_likelihood(const Vector<float>& theta);  // of the minibatch
+
   const PolicyNetwork<float>& network_;
   const Normalizer& normalizer_;
   const DemoData& demos_;

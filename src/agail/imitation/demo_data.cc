@@ -3,6 +3,17 @@
 #include <algorithm>
 
 namespace agail {
+namespace {
+
+// As the environment takes it: a policy's actions, which are compared with these, are executed
+// within the bounds, too.
+float executed(const ActionSpace& space, Index i, float action) {
+  if (space.discrete) return action;
+  const auto entry = static_cast<std::size_t>(i);
+  return std::clamp(action, space.low[entry], space.high[entry]);
+}
+
+}  // namespace
 
 DemoData::DemoData(const Demonstrations& demos) {
   const Index n = demos.transitions();
@@ -19,7 +30,7 @@ DemoData::DemoData(const Demonstrations& demos) {
       Index known = 0;
       for (Index i = 0; i < dim; ++i) {
         if (episode.available(t, i) == 0) continue;  // what stands in a missing entry is never read
-        actions(i, column) = static_cast<float>(episode.actions(t, i));
+        actions(i, column) = executed(demos.action, i, static_cast<float>(episode.actions(t, i)));
         available(i, column) = 1;
         ++known;
       }

@@ -2,9 +2,13 @@
 // Fisher-vector products, and surrogate and KL at other parameters. Schulman et al., "Trust Region
 // Policy Optimization", 2015:
 //
-//   L(theta)  = mean_j pi_theta(a_j|s_j) / pi_old(a_j|s_j) A_j + w mean_j H(pi_theta(.|s_j)) (eq.
-//   14) F         = mean_j J_j^T M_j J_j,   J the Jacobian of the network's outputs, M their Fisher
-//   matrix (appendix C) KL(theta) = mean_j KL(pi_old(.|s_j) || pi_theta(.|s_j))
+//   L(theta)  = mean_j pi_theta(a_j|s_j) / pi_old(a_j|s_j) A_j + w mean_j H(pi_theta(.|s_j))
+//
+//   F         = mean_j J_j^T M_j J_j
+//
+//   KL(theta) = mean_j KL(pi_old(.|s_j) || pi_theta(.|s_j))
+//
+// (equation 14 and appendix C; J is the Jacobian of the network's outputs, M their Fisher matrix.)
 #pragma once
 
 #include "agail/nn/chunks.h"

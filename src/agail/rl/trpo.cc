@@ -53,8 +53,8 @@ TrpoReport Trpo::update(Vector<float>& theta, const Matrix<float>& x, const Matr
   const double start = whole(old_, before.surrogate);
   report.entropy = before.entropy;
   if (std::isfinite(curvature) && curvature > 0) {
-    // The longest step s with s^T F s / 2 = max_kl, halved until the KL is kept and the objective
-    // improves.
+    // The longest step s with s^T (F + damping I) s / 2 = max_kl, halved until the KL is kept and
+    // the objective improves.
     double scale = std::sqrt(2 * settings_.max_kl / curvature);
     for (int i = 0; i < settings_.line_search_halvings; ++i, scale /= 2) {
       candidate_ = old_ + static_cast<float>(scale) * step_;
