@@ -309,7 +309,7 @@ def main() -> None:
 
     kept = Kept(work, options.quick)
     rates: dict[tuple[str, str], list[float]] = {}
-    versions: dict[str, str] = {}
+    versions: dict[str, dict[str, str]] = {}  # of each project's own environment
     rows = []
     for environment in ENVIRONMENTS:
         for contender in everyone:
@@ -322,7 +322,7 @@ def main() -> None:
                 if entry["rate"] == 0:
                     continue
                 rates.setdefault((environment, contender.name), []).append(entry["rate"])
-                versions |= entry["versions"]
+                versions[contender.name.split()[0]] = entry["versions"]
                 rows.append(
                     {
                         "environment": environment,
@@ -343,7 +343,10 @@ def main() -> None:
     about = (
         f"`{command}`, {date.today()}, on {cpu_model()}, {os.cpu_count()} CPUs of which 2 (or 1) are used, "
         f"Linux {platform.release()}; "
-        + ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
+        + "; ".join(
+            f"{project}: " + ", ".join(f"{name} {version}" for name, version in sorted(own.items()))
+            for project, own in versions.items()
+        )
         + "."
     )
     if options.quick:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import importlib
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -59,13 +60,13 @@ class _Observations:
             flat = np.zeros(self.size)
             flat[index] = 1
             return flat
-        array = np.asarray(value, np.float64)
+        array = np.array(value, np.float64, order="C")  # a copy: the environment may reuse its own
         if array.shape != self.space.shape:
             raise InputError(
                 f"environment {name}: an observation of shape {array.shape}, but its "
                 f"observation_space has {self.space.shape}; mend the environment"
             )
-        return np.ascontiguousarray(array).reshape(-1)
+        return array.reshape(-1)
 
 
 class _Actions:
@@ -176,7 +177,6 @@ class Source:
     """Environments of one kind. Those that were made are kept for the next use, until close()."""
 
     def __init__(self, environment: EnvironmentLike):
-        self._given: gymnasium.Env | None = None
         self._made: list[gymnasium.Env] = []
         self._idle: list[gymnasium.Env] = []
         self._make = self._factory(environment)
@@ -201,9 +201,9 @@ class Source:
                     "wrappers, or a function that makes one environment (a vector environment with "
                     "num_envs=1 will do), with lanes=N"
                 )
-            return functions[0]
+            turns = itertools.cycle(functions)
+            return lambda: next(turns)()
         if isinstance(environment, gymnasium.Env):
-            self._given = environment
             self._idle.append(environment)
             return lambda: self._copy(environment)
         if callable(environment):
@@ -217,15 +217,13 @@ class Source:
     def _copy(environment: gymnasium.Env) -> gymnasium.Env:
         """Another one of its kind: evaluation must not disturb the episode under way."""
         try:
-            if environment.spec is not None:
-                return gymnasium.make(environment.spec)
-        except (
-            Exception
-        ):  # a wrapper that does not say how it was made, an id that is not registered
-            pass
-        try:
-            return copy.deepcopy(environment)
+            return copy.deepcopy(environment)  # with what was changed after it was made
         except Exception as error:
+            try:
+                if environment.spec is not None:
+                    return gymnasium.make(environment.spec)
+            except Exception:  # a wrapper that does not say how it was made, an unknown id
+                pass
             raise InputError(
                 f"{environment} cannot be copied ({type(error).__name__}: {error}), but training "
                 "needs another one to evaluate in; give a function that makes the environment"
@@ -241,10 +239,15 @@ class Source:
         if self._idle:
             return self._idle.pop()
         made = self._make()
+        if not isinstance(made, gymnasium.Env | gymnasium.vector.VectorEnv):
+            raise InputError(f"{self._make!r} returned {made!r}, which is no gymnasium.Env")
+        if any(other.unwrapped is made.unwrapped for other in self._made):
+            raise InputError(
+                f"{self._make!r} returned the same environment twice, but lanes and evaluation need "
+                "environments of their own; it must make a new one each time"
+            )
         if isinstance(made, gymnasium.vector.VectorEnv):
             made = OfOne(made)
-        if not isinstance(made, gymnasium.Env):
-            raise InputError(f"{self._make!r} returned {made!r}, which is no gymnasium.Env")
         self._made.append(made)
         return made
 

@@ -80,6 +80,7 @@ class Group:
         evaluations = [
             run.summary.get("best_evaluation") or run.summary.get("last_evaluation")
             for run in self.runs
+            if run.finished
         ]
         return [each["mean_return"] for each in evaluations if each]
 
@@ -273,7 +274,8 @@ def results_table(groups: list[Group]) -> str:
         low, high = bootstrap_interval(returns[:, None], iqm, RESAMPLES)
         interval = f"{low[0]:,.1f} to {high[0]:,.1f}" if len(returns) > 1 else "-"
         reference = group.reference()
-        share = f"{100 * returns.mean() / reference:.1f} %" if reference else "-"
+        known = reference is not None and reference > 0  # a share of less than nothing says nothing
+        share = f"{100 * returns.mean() / reference:.1f} %" if known else "-"
         rows.append([*row, f"{iqm(returns):,.1f}", interval, f"{returns.min():,.1f}", share])
     head = [
         "runs",

@@ -82,7 +82,7 @@ class Evaluation:
     mean_return: float
     standard_error: float
     confidence_interval_95: tuple[float, float]  # of the mean (bootstrap)
-    share_of_demonstrations: float | None  # mean return / the demonstrations', if that is known
+    share_of_demonstrations: float | None  # mean return / the demonstrations', if that is above 0
 
 
 def _assignments(settings: Mapping[str, Any]) -> list[str]:
@@ -147,7 +147,8 @@ def train(
     preset: "default", "paper" or a .toml file; settings: any setting of docs/settings.md, as
     trpo={"max_kl": 0.02} or **{"trpo.max_kl": 0.02}.
     resume: go on with the run in `out`.
-    callback: called after each update with a row of progress.csv as a dict; False stops the run.
+    callback: called after each update with a row of progress.csv as a dict; what is false, but not
+    None, stops the run.
     An exception of the callback stops it, too, and is raised when the run has been saved.
 
     Ctrl-C saves a checkpoint and raises KeyboardInterrupt; resume=True goes on. InputError (a
@@ -240,7 +241,7 @@ def evaluate(
     policy = _policy(policy)
     result = _play(_core.evaluate, policy, episodes, environment, seed, deterministic, threads)
     reference = policy.demonstrations_mean_return
-    share = result["mean_return"] / reference if reference else None
+    share = result["mean_return"] / reference if reference and reference > 0 else None
     return Evaluation(share_of_demonstrations=share, **result)
 
 
@@ -277,7 +278,14 @@ def _environment_for(
     if environment is None:
         return source_of(policy.environment)
     name, source = source_of(environment)
-    if name != policy.environment:
+    if _registered(name) != _registered(policy.environment):
         source.close()
         raise InputError(f"the policy is for {policy.environment}, the environment is {name}")
-    return name, source
+    if isinstance(source, Source):
+        source.name = policy.environment  # the core asks for it by this name
+    return policy.environment, source
+
+
+def _registered(name: str) -> str:
+    """Without the module that registers it, and without the name that ours have in Gymnasium."""
+    return name.rpartition(":")[2].removeprefix("agail/")

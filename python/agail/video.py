@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from argparse import Namespace
 from collections.abc import Iterator
@@ -25,7 +26,7 @@ HOLD = 1.0  # seconds that the end of an episode stays in view
 
 def film(
     policy: Policy,
-    out: Path,
+    out: str | os.PathLike[str],
     *,
     environment: str | None = None,
     episodes: int = 1,
@@ -41,6 +42,7 @@ def film(
     a second; at the environment's own speed, so that steps are left out. demonstrations: episode i
     is shown on the left of a policy that begins in its first state.
     """
+    out = Path(out)
     name = environment or policy.environment
     player = Player(policy, name, size)
     speed = float(player.environment.metadata.get("render_fps") or 30)

@@ -36,6 +36,7 @@ nb::dict describe(const std::string& id) {
 class NativeEnvironments {
  public:
   NativeEnvironments(const std::string& id, int count, int threads) : pool_(threads) {
+    if (count < 1) throw InputError("num_envs is " + std::to_string(count) + "; at least 1");
     for (int i = 0; i < count; ++i) lanes_.push_back({make_environment(id)});
     const EnvironmentSpec& spec = lanes_.front().environment->spec();
     dim_ = static_cast<std::size_t>(spec.observation_dim);
@@ -46,6 +47,8 @@ class NativeEnvironments {
   // Starts the next episode of each environment that `mask` marks; with seeds, its first one under
   // that seed.
   Array<double> reset(const std::vector<std::uint64_t>& seeds, const std::vector<bool>& mask) {
+    check_count("seeds", seeds.empty() ? lanes_.size() : seeds.size());
+    check_count("entries of reset_mask", mask.size());
     Array<double> observations = make_array<double>({lanes_.size(), dim_});
     double* out = observations.data();
     const nb::gil_scoped_release no_gil;
@@ -107,6 +110,12 @@ class NativeEnvironments {
     RandomStream random(lane.seed, Purpose::kReset, 0, lane.episode++);
     lane.environment->reset(random);
     lane.ended = false;
+  }
+
+  void check_count(const std::string& what, std::size_t count) const {
+    if (count != lanes_.size())
+      throw InputError("reset() got " + std::to_string(count) + " " + what + " for " +
+                       std::to_string(lanes_.size()) + " environments; one each");
   }
 
   void check(const InputArray<float>& actions) const {

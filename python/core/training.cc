@@ -48,7 +48,10 @@ class UpdateCallback {
       nb::dict values;
       for (std::size_t i = 0; i < row.size(); ++i) values[names_[i].c_str()] = row[i];
       const nb::object answer = function_(values);
-      return !(nb::isinstance<nb::bool_>(answer) && !nb::cast<bool>(answer));
+      if (answer.is_none()) return true;
+      const int truth = PyObject_IsTrue(answer.ptr());  // NumPy's False is no bool
+      if (truth < 0) nb::raise_python_error();
+      return truth != 0;
     } catch (const nb::python_error& error) {
       failure_.emplace(error);
       return false;

@@ -65,6 +65,11 @@ def read(path: str | os.PathLike[str]) -> Arrays:
     for ours, theirs in NAMES.items():
         if theirs in found:
             arrays[ours] = rows(str(path), theirs, found[theirs], count)
+    if "timeouts" not in found and "next_observations" not in found:
+        raise InputError(
+            f"{path} has neither timeouts nor next_observations, so nobody knows where an episode ended "
+            "at a time limit; add timeouts (a bool a row, all False if none did)"
+        )
     ends = arrays.get("terminations", np.zeros(count)).astype(bool)
     ends = ends | arrays.get("truncations", np.zeros(count)).astype(bool)
     arrays["episodes"] = np.concatenate([[0], np.cumsum(ends)[:-1]])

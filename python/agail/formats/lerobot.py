@@ -73,7 +73,7 @@ def _values(where: str, name: str, column: Any) -> np.ndarray:
     widths = np.unique(lengths.drop_null().to_numpy(zero_copy_only=False))
     if len(widths) > 1:
         raise InputError(f"{where}: {name} has {widths[0]} to {widths[-1]} numbers in a frame")
-    values = flat.reshape(int(valid.sum()), -1)
+    values = flat.reshape(int(valid.sum()), widths[0] if len(widths) else 0)
     if valid.all():
         return values
     whole = np.full((len(valid), values.shape[1]), np.nan, np.result_type(values, np.float32))
@@ -100,8 +100,11 @@ def read(path: str | os.PathLike[str]) -> Arrays:
     table, where = _table(path), str(path)
     if table.num_rows == 0:
         raise InputError(f"{path} has no frames")
-    found = {name: _values(where, name, table[name]) for name in table.column_names}
     count = table.num_rows
+    names = table.column_names
+    if ACTION in names and table[ACTION].null_count == count:  # nothing tells how many they are
+        names.remove(ACTION)
+    found = {name: _values(where, name, table[name]) for name in names}
     episodes = rows(where, "episode_index", found["episode_index"], count)
     frames = rows(where, "frame_index", found.get("frame_index", np.arange(count)), count)
     order = np.lexsort((frames, episodes))

@@ -201,6 +201,7 @@ def test_a_file_of_d4rl(tmp_path):
         ({"rewards": np.zeros((12, 2))}, "rewards have the shape"),
         ({"rewards": np.full(12, np.nan)}, "reward in row 0"),
         ({"timeouts": np.zeros(3)}, "timeouts have the shape"),
+        ({"timeouts": None}, "neither timeouts nor next_observations"),
         ({"terminals": np.full(12, 3)}, "neither 0 nor 1"),
         ({"terminals": np.arange(12) == 0}, "single row"),
         ({"next_observations": np.zeros((12, 11))}, "next observation"),
@@ -282,10 +283,10 @@ def test_missing_actions_of_lerobot(tmp_path):
     assert (
         demos[0].actions[:, 0].tolist() == [1, 0, 0, 1] and demos.to_arrays()["actions"].ndim == 1
     )
-    assert (
-        Demonstrations.from_lerobot(dataset(tmp_path / "none", [frames(action=None)])).action_dim
-        == 0
-    )
+    nulls = pyarrow.array([None] * 12, pyarrow.list_(pyarrow.float32()))
+    for i, absent in enumerate([None, nulls, pyarrow.nulls(12)]):
+        demos = Demonstrations.from_lerobot(dataset(tmp_path / f"none{i}", [frames(action=absent)]))
+        assert demos.action_dim == 0
 
 
 LISTS = pyarrow.array([[1.0, 2.0]] * 11 + [[1.0]])

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from collections import Counter
 
 import gymnasium
 import numpy as np
@@ -14,6 +15,7 @@ from small import Line, train
 
 import agail
 from agail import _core
+from agail._source import Lane, Source
 
 NATIVE = _core.environment_ids()
 
@@ -83,6 +85,59 @@ def test_kinds_of_environments():
     run = train(kinds[2], method="trpo")
     assert run.settings["run"]["lanes"] == 2
     given.step(np.zeros(1, np.float32))  # still the caller's, not closed
+
+
+class Weighted(Line):
+    """Counts the steps of each weight."""
+
+    def __init__(self, weight, steps):
+        super().__init__()
+        self.weight, self.counted = weight, steps
+
+    def __deepcopy__(self, memo):
+        return Weighted(self.weight, self.counted)
+
+    def step(self, action):
+        self.counted[self.weight] += 1
+        return super().step(action)
+
+
+def test_a_vector_of_different_environments():
+    steps = Counter()
+    vector = gymnasium.vector.SyncVectorEnv([lambda w=w: Weighted(w, steps) for w in (1, 2)])
+    train(vector, method="trpo", timesteps=512, run={"evaluate_every": 0})
+    assert steps == {1: 256, 2: 256}
+
+
+def test_an_instance_is_copied_as_it_is():
+    steps = Counter()
+    given = Weighted(1, steps)
+    given.weight = 5
+    train(given, method="trpo", lanes=2, timesteps=512)
+    assert set(steps) == {5}
+    changed = gymnasium.make("Pendulum-v1")
+    changed.unwrapped.max_torque = 5
+    source = Source(changed)
+    torques = [source.lane(Lane)._environment.unwrapped.max_torque for _ in range(2)]
+    assert torques == [5, 5]
+
+
+def test_a_function_that_makes_one_environment_only():
+    given = Line()
+    with pytest.raises(agail.InputError, match="same environment twice"):
+        train(lambda: given, method="trpo")
+    vector = gymnasium.vector.SyncVectorEnv([Line])
+    with pytest.raises(agail.InputError, match="same environment twice"):
+        train(lambda: vector, method="trpo")
+
+
+def test_share_of_less_than_nothing():
+    run = train(Line, method="trpo")
+    demos = agail.record(run, 3, environment=Line)
+    imitator = train(Line, demos, method="bc")
+    assert imitator.policy.demonstrations_mean_return == pytest.approx(demos.mean_return)
+    assert demos.mean_return < 0
+    assert agail.evaluate(imitator, 2, environment=Line).share_of_demonstrations is None
 
 
 def test_vector_environment_that_cannot_be_taken_apart():
@@ -357,6 +412,16 @@ def test_vector_is_its_environments(name):
     same = [ours.reset(seed=9)[0] for _ in range(2)]
     np.testing.assert_array_equal(*same)
     assert len(np.unique(same[0], axis=0)) == count
+
+
+def test_vector_is_asked_for_what_it_has_not():
+    many = gymnasium.make_vec("agail/CartPole-v1", 4, vectorization_mode="vector_entry_point")
+    with pytest.raises(agail.InputError, match="2 seeds for 4 environments"):
+        many.reset(seed=[1, 2])
+    with pytest.raises(agail.InputError, match="1 entries of reset_mask for 4"):
+        many.reset(options={"reset_mask": np.array([True])})
+    with pytest.raises(agail.InputError, match="num_envs is 0"):
+        _core.NativeEnvironments("CartPole-v1", 0, 1)
 
 
 def test_vector_is_fast():

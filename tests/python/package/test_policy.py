@@ -131,6 +131,8 @@ def test_evaluate(hopper, hopper_run):
     # Gymnasium's own Hopper, through the policy: another reset, the same task.
     environment = agail.evaluate(hopper, 5, environment=lambda: gymnasium.make("Hopper-v5"))
     assert environment.mean_return == pytest.approx(result.mean_return, rel=0.5)
+    ours = agail.evaluate(hopper, 5, environment=gymnasium.make("agail/Hopper-v5"))
+    assert ours.mean_return == pytest.approx(result.mean_return, rel=0.5)
     with pytest.raises(agail.InputError, match="CartPole"):
         agail.evaluate(hopper, environment=gymnasium.make("CartPole-v1"))
     with pytest.raises(agail.InputError, match="episodes"):

@@ -47,6 +47,21 @@ def test_episodes_are_the_environments():
     assert model.asked[-1][3] is False
 
 
+def test_environments_that_reuse_their_observation():
+    class Reusing(Line):
+        def __init__(self):
+            super().__init__()
+            self.observation_space = spaces.Box(-10, 10, (2,), np.float64)
+            self.buffer = np.zeros(2)
+
+        def observation(self):
+            self.buffer[:] = self.at, self.steps
+            return self.buffer
+
+    demos = agail.record(Model(lambda observation: np.zeros(1)), 1, environment=Reusing)
+    np.testing.assert_array_equal(demos[0].observations[:, 1], np.arange(51))
+
+
 def test_discrete_actions_and_built_in_environments():
     demos = agail.record(Model(lambda seen: seen - 3), 2, environment=Discretes)
     assert demos.mean_return == 20  # it was asked with what the environment gave, not one-hot

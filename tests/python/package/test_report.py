@@ -64,6 +64,7 @@ def test_page(runs, tmp_path):
     assert done.returncode == 0 and "7 runs" in done.stdout, done.stderr
     text = (tmp_path / "r.html").read_text()
     assert "7 runs" in text and "3 of 3" in text and "IQM" in text and "missing 0.75" in text
+    assert "0 of 1" in text  # one was stopped
     assert not re.search(r"(src|href)=\"?https?:|@import|url\(http", text), "from elsewhere"
     pictures = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
     files = sorted(path.name for path in (tmp_path / "figures").iterdir())

@@ -82,11 +82,15 @@ def test_callback_sees_the_log():
         np.testing.assert_allclose([row[name] for row in rows], column)
 
 
-def test_callback_stops_and_the_run_goes_on(tmp_path):
+@pytest.mark.parametrize("answer", [bool, np.bool_, int])
+def test_callback_stops_and_the_run_goes_on(tmp_path, answer):
     whole = train("CartPole-v1", method="trpo", out=tmp_path / "whole")
     out = tmp_path / "stopped"
     stopped = train(
-        "CartPole-v1", method="trpo", out=out, callback=lambda row: row["time/iterations"] < 2
+        "CartPole-v1",
+        method="trpo",
+        out=out,
+        callback=lambda row: answer(row["time/iterations"] < 2),
     )
     assert not stopped.finished and len(stopped.metrics["time/iterations"]) == 2
     resumed = train("CartPole-v1", method="trpo", out=out, resume=True)
