@@ -1,8 +1,12 @@
 #include <gmock/gmock.h>
+#include <signal.h>  // NOLINT(modernize-deprecated-headers): POSIX's, not C's
+#include <sys/resource.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <iostream>
 
 #include "agail/base/atomic_file.h"
 #include "agail/base/error.h"
@@ -146,6 +150,30 @@ TEST(RoundTrip, ReplacesDatasetsAndNothingElse) {
   EXPECT_THROW(write_demonstrations(sample({10}), "/proc/none/folder"), InputError);
   for (const auto& entry : std::filesystem::directory_iterator(folder / ""))
     EXPECT_THAT(entry.path().string(), testing::Not(testing::HasSubstr(".tmp")));
+}
+
+[[noreturn]] void write_on_a_full_disk(const std::string& path) {
+  ::signal(SIGXFSZ, SIG_IGN);
+  const rlimit limit{20000, 20000};
+  ::setrlimit(RLIMIT_FSIZE, &limit);
+  try {
+    write_demonstrations(sample({3000}), path);
+  } catch (const SystemError& error) {
+    std::cerr << error.what();
+    std::exit(1);  // and not a crash there
+  }
+  std::exit(0);
+}
+
+TEST(RoundTrip, AFullDiskLeavesWhatWasThere) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"d.hdf5", "d"}) {
+    write_demonstrations(sample({10}), folder / name);
+    EXPECT_EXIT(write_on_a_full_disk(folder / name), testing::ExitedWithCode(1),
+                "cannot write .*agail-demos-.*disk full");
+    EXPECT_EQ(read_demonstrations(folder / name).transitions(), 10);
+  }
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / ""), {}), 2);
 }
 
 TEST(RoundTrip, FilesAreSmall) {

@@ -46,7 +46,7 @@ fs::path temporary_name(const fs::path& path) {
          ("." + path.filename().string() + "." + std::to_string(::getpid()) + ".tmp");
 }
 
-void write_and_sync(const fs::path& path, std::span<const std::uint8_t> bytes) {
+void write_bytes(const fs::path& path, std::span<const std::uint8_t> bytes) {
   const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
   if (file.get() < 0) fail("create", path);
   std::size_t done = 0;
@@ -56,7 +56,11 @@ void write_and_sync(const fs::path& path, std::span<const std::uint8_t> bytes) {
     if (n < 0) fail("write", path);
     done += static_cast<std::size_t>(n);
   }
-  if (::fsync(file.get()) != 0) fail("write", path);
+}
+
+void sync_file(const fs::path& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0 || ::fsync(file.get()) != 0) fail("write", path);
 }
 
 // Makes the rename itself durable. Some network file systems cannot (EINVAL); nothing more to do
@@ -69,19 +73,24 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
-void write_file_atomically(const fs::path& path, std::span<const std::uint8_t> bytes) {
+void write_file_atomically(const fs::path& path, const std::function<void(const fs::path&)>& fill) {
   std::error_code ignored;
   if (!path.has_filename() || fs::is_directory(path, ignored))
     throw InputError("cannot write " + path.string() + ": it is a folder; give a file name");
   const fs::path temporary = temporary_name(path);
   try {
-    write_and_sync(temporary, bytes);
+    fill(temporary);
+    sync_file(temporary);
     if (::rename(temporary.c_str(), path.c_str()) != 0) fail("write", path);
   } catch (...) {
     ::unlink(temporary.c_str());
     throw;
   }
   sync_folder(folder_of(path));
+}
+
+void write_file_atomically(const fs::path& path, std::span<const std::uint8_t> bytes) {
+  write_file_atomically(path, [bytes](const fs::path& file) { write_bytes(file, bytes); });
 }
 
 void write_file_atomically(const fs::path& path, std::string_view text) {

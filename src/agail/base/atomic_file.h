@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,9 @@ namespace agail {
 // fails; InputError if `path` is a folder.
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+// The same for what writes into a file by its name: `fill` makes a file of the temporary name.
+void write_file_atomically(const std::filesystem::path& path,
+                           const std::function<void(const std::filesystem::path&)>& fill);
 
 // Creates a folder that the user named (and its parents) and makes sure that files can be created
 // in it: InputError if not. For an output file, pass its parent; an empty path is the current

@@ -24,9 +24,14 @@ static_assert(sizeof(hid_t) == sizeof(std::int64_t));
 constexpr std::size_t kBestCompression = 1032;
 constexpr std::size_t kLongestText = std::size_t{16} << 20;
 
-// HDF5 prints its error stack to stderr unless told otherwise; our messages say what the user can
-// do.
-void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+// Before the first use of HDF5. It prints its error stack to stderr unless told otherwise; our
+// messages say what the user can do. And it closes at exit what is still open, which is only what
+// could not be written: it would crash.
+void prepare() {
+  static const herr_t once = H5dont_atexit();
+  static_cast<void>(once);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
 
 Handle own(hid_t id, Handle::Close close, const std::string& where) {
   if (id < 0)
@@ -35,11 +40,14 @@ Handle own(hid_t id, Handle::Close close, const std::string& where) {
 }
 
 // For what fails only if the machine does.
-hid_t made(hid_t id) {
-  if (id < 0) throw SystemError("HDF5 could not write a temporary file (disk full?)");
+[[noreturn]] void unwritten(const std::string& file) {
+  throw SystemError("cannot write " + file + "; is the disk full?");
+}
+hid_t made(hid_t id, const std::string& file = "a file") {
+  if (id < 0) unwritten(file);
   return id;
 }
-void done(herr_t status) { made(status); }
+void done(herr_t status, const std::string& file = "a file") { made(status, file); }
 
 int close_type(std::int64_t id) { return H5Tclose(id); }
 int close_space(std::int64_t id) { return H5Sclose(id); }
@@ -139,14 +147,6 @@ Handle boolean_type() {
   done(H5Tenum_insert(type.id(), "FALSE", &no));
   done(H5Tenum_insert(type.id(), "TRUE", &yes));
   return type;
-}
-
-void write_scalar(hid_t object, const std::string& name, hid_t type, const void* value) {
-  const Handle space(made(H5Screate(H5S_SCALAR)), close_space);
-  const Handle attribute(
-      made(H5Acreate2(object, name.c_str(), type, space.id(), H5P_DEFAULT, H5P_DEFAULT)),
-      close_attribute);
-  done(H5Awrite(attribute.id(), type, value));
 }
 
 }  // namespace
@@ -281,9 +281,9 @@ std::optional<std::int64_t> Group::integer_attribute(const std::string& name) co
 Group Group::create_group(const std::string& name) {
   const Handle creation = untimed(H5P_GROUP_CREATE);
   Group child;
-  child.handle_ =
-      Handle(made(H5Gcreate2(handle_.id(), name.c_str(), H5P_DEFAULT, creation.id(), H5P_DEFAULT)),
-             close_group);
+  child.handle_ = Handle(
+      made(H5Gcreate2(handle_.id(), name.c_str(), H5P_DEFAULT, creation.id(), H5P_DEFAULT), file_),
+      close_group);
   child.file_ = file_;
   child.path_ = path_.empty() ? name : path_ + "/" + name;
   return child;
@@ -306,10 +306,21 @@ void Group::write(const std::string& name, const std::vector<std::size_t>& shape
   done(H5Pset_fletcher32(creation.id()));  // so that damage is noticed
   const Handle boolean = boolean_type();
   const hid_t stored = type == Type::kBoolean ? boolean.id() : memory_type(type);
-  const Handle dataset(made(H5Dcreate2(handle_.id(), name.c_str(), stored, space.id(), H5P_DEFAULT,
-                                       creation.id(), H5P_DEFAULT)),
-                       close_dataset);
-  done(H5Dwrite(dataset.id(), stored, H5S_ALL, H5S_ALL, H5P_DEFAULT, values));
+  Handle dataset(made(H5Dcreate2(handle_.id(), name.c_str(), stored, space.id(), H5P_DEFAULT,
+                                 creation.id(), H5P_DEFAULT),
+                      file_),
+                 close_dataset);
+  done(H5Dwrite(dataset.id(), stored, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), file_);
+  if (!dataset.release()) unwritten(file_);  // only now are chunks written
+}
+
+void Group::write_scalar(const std::string& name, std::int64_t type, const void* value) {
+  const Handle space(made(H5Screate(H5S_SCALAR)), close_space);
+  const Handle attribute(
+      made(H5Acreate2(handle_.id(), name.c_str(), type, space.id(), H5P_DEFAULT, H5P_DEFAULT),
+           file_),
+      close_attribute);
+  done(H5Awrite(attribute.id(), type, value), file_);
 }
 
 void Group::write_attribute(const std::string& name, const std::string& text) {
@@ -317,13 +328,13 @@ void Group::write_attribute(const std::string& name, const std::string& text) {
   done(H5Tset_size(type.id(), H5T_VARIABLE));
   done(H5Tset_cset(type.id(), H5T_CSET_UTF8));
   const char* value = text.c_str();
-  write_scalar(handle_.id(), name, type.id(), &value);
+  write_scalar(name, type.id(), &value);
 }
 void Group::write_attribute(const std::string& name, std::int64_t number) {
-  write_scalar(handle_.id(), name, H5T_NATIVE_INT64, &number);
+  write_scalar(name, H5T_NATIVE_INT64, &number);
 }
 void Group::write_attribute(const std::string& name, double number) {
-  write_scalar(handle_.id(), name, H5T_NATIVE_DOUBLE, &number);
+  write_scalar(name, H5T_NATIVE_DOUBLE, &number);
 }
 
 File File::wrap(Handle handle, const std::string& name) {
@@ -335,7 +346,7 @@ File File::wrap(Handle handle, const std::string& name) {
 }
 
 File File::open(const std::string& path) {
-  silence();
+  prepare();
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(path, error);
   if (error) throw InputError(path + " cannot be read: " + error.message());
@@ -353,7 +364,7 @@ File File::open(const std::string& path) {
 }
 
 File File::from_image(std::span<const std::uint8_t> bytes, const std::string& name) {
-  silence();
+  prepare();
   const Handle access = access_properties();
   done(H5Pset_fapl_core(access.id(), std::size_t{1} << 20, false));
   std::vector<std::uint8_t> copy(bytes.begin(), bytes.end());
@@ -366,29 +377,40 @@ File File::from_image(std::span<const std::uint8_t> bytes, const std::string& na
   return file;
 }
 
-File File::create_temporary() {
-  silence();
-  std::string path = (std::filesystem::temp_directory_path() / "agail-XXXXXX").string();
-  const int descriptor = ::mkstemp(path.data());
-  if (descriptor < 0) throw SystemError("cannot create " + path + ": " + std::strerror(errno));
-  ::close(descriptor);
-  TemporaryPath temporary(path);
+File File::create(const std::string& path) {
+  prepare();
   const Handle access = access_properties();
   // The 1.10 format is the first that checksums its own structure and has no overhead for a dataset
   // of one chunk.
   done(H5Pset_libver_bounds(access.id(), H5F_LIBVER_V110, H5F_LIBVER_V110));
   const Handle creation = untimed(H5P_FILE_CREATE);
-  Handle handle(made(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.id(), access.id())),
+  // Nobody else knows the file, and some network file systems have no locks.
+  done(H5Pset_file_locking(access.id(), false, true));
+  Handle handle(made(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.id(), access.id()), path),
                 close_file);
-  File file = wrap(std::move(handle), path);
+  return wrap(std::move(handle), path);
+}
+
+File File::create_temporary() {
+  std::string path = (std::filesystem::temp_directory_path() / "agail-XXXXXX").string();
+  const int descriptor = ::mkstemp(path.data());
+  if (descriptor < 0) throw SystemError("cannot create " + path + ": " + std::strerror(errno));
+  ::close(descriptor);
+  TemporaryPath temporary(path);
+  File file = create(path);
   file.temporary_ = std::move(temporary);
   return file;
 }
 
-std::vector<std::uint8_t> File::close_and_take() {
+void File::close() {
+  const std::string path = root_.file_;
   root_ = Group();
-  handle_ = Handle();
-  return read_file(temporary_.get());
+  if (!handle_.release()) unwritten(path);
+}
+
+std::vector<std::uint8_t> File::close_and_take() {
+  close();
+  return read_file(temporary_.get(), std::numeric_limits<std::size_t>::max());
 }
 
 }  // namespace agail::hdf5

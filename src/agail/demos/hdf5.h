@@ -26,9 +26,9 @@ class Handle {
     std::swap(close_, other.close_);
     return *this;
   }
-  ~Handle() {
-    if (id_ >= 0 && close_ != nullptr) close_(id_);
-  }
+  ~Handle() { release(); }
+  // Releases it now. False if that failed: what HDF5 had still to write is not in the file.
+  bool release() { return id_ < 0 || close_ == nullptr || close_(std::exchange(id_, -1)) >= 0; }
   std::int64_t id() const { return id_; }
   bool valid() const { return id_ >= 0; }
 
@@ -76,6 +76,7 @@ class Group {
 
  private:
   friend class File;
+  void write_scalar(const std::string& name, std::int64_t type, const void* value);
   Handle handle_;
   std::string file_;
   std::string path_;  // inside the file, "" for the root
@@ -103,13 +104,16 @@ class File {
   static File open(const std::string& path);
   // A file that lies in memory; `name` is for messages.
   static File from_image(std::span<const std::uint8_t> bytes, const std::string& name);
+  // A new file, in place of what is there. Equal contents give equal bytes.
+  static File create(const std::string& path);
   // A new file under a temporary name. (An image in memory will not do: HDF5 leaves the mark of an
   // open file in it.)
   static File create_temporary();
 
   Group& root() { return root_; }
-  // The bytes of such a file; nothing else can be done with it then. Equal contents give equal
-  // bytes.
+  // Of a new file: SystemError unless everything is written. Nothing else can be done with it then.
+  void close();
+  // The same, and the bytes of a temporary file.
   std::vector<std::uint8_t> close_and_take();
 
  private:

@@ -166,31 +166,41 @@ void write_folder(const Demonstrations& demonstrations, const std::string& path)
   check_replaceable_dataset(path);
   ordered_json metadata = metadata_of(demonstrations);
   metadata["dataset_id"] = dataset_id_for(path);
-  hdf5::File file = hdf5::File::create_temporary();
-  write_episodes(file.root(), demonstrations);
-  const std::vector<std::uint8_t> bytes = file.close_and_take();
-  // Megabytes to one decimal, as Minari has it.
-  metadata["dataset_size"] = std::round(static_cast<double>(bytes.size()) / 1e5) / 10;
   replace_folder(path, [&](const fs::path& folder) {
     fs::create_directory(folder / "data");
-    write_file_atomically(folder / "data" / "main_data.hdf5", bytes);
+    const fs::path data = folder / "data" / "main_data.hdf5";
+    write_file_atomically(data, [&](const fs::path& temporary) {
+      hdf5::File file = hdf5::File::create(temporary.string());
+      write_episodes(file.root(), demonstrations);
+      file.close();
+    });
+    // Megabytes to one decimal, as Minari has it.
+    metadata["dataset_size"] = std::round(static_cast<double>(fs::file_size(data)) / 1e5) / 10;
     write_file_atomically(folder / "data" / "metadata.json", dump(metadata));
   });
+}
+
+void write_single_file(const Demonstrations& demonstrations, Group& root) {
+  write_attributes(root, metadata_of(demonstrations));
+  write_episodes(root, demonstrations);
 }
 
 }  // namespace
 
 std::vector<std::uint8_t> encode_demonstrations(const Demonstrations& demonstrations) {
   hdf5::File file = hdf5::File::create_temporary();
-  write_attributes(file.root(), metadata_of(demonstrations));
-  write_episodes(file.root(), demonstrations);
+  write_single_file(demonstrations, file.root());
   return file.close_and_take();
 }
 
 void write_demonstrations(const Demonstrations& demonstrations, const std::string& path) {
   if (!is_single_file(path)) return write_folder(demonstrations, path);
   create_output_folder(fs::path(path).parent_path());
-  write_file_atomically(path, encode_demonstrations(demonstrations));
+  write_file_atomically(path, [&](const fs::path& temporary) {
+    hdf5::File file = hdf5::File::create(temporary.string());
+    write_single_file(demonstrations, file.root());
+    file.close();
+  });
 }
 
 }  // namespace agail
