@@ -141,6 +141,13 @@ TEST(RoundTrip, ReplacesDatasetsAndNothingElse) {
   std::filesystem::create_directory(folder / "precious");
   std::ofstream(folder / "precious/thesis.tex") << "x";
   EXPECT_THROW(write_demonstrations(sample({10}), folder / "precious"), InputError);
+  std::filesystem::create_directories(folder / "project/data");
+  for (const char* name : {"metadata.json", "main_data.hdf5", "mine.hdf5"}) {
+    std::ofstream(folder / ("project/data/" + std::string(name))) << "x";
+    if (name == std::string("main_data.hdf5")) continue;  // these two alone are a dataset
+    EXPECT_THROW(write_demonstrations(sample({10}), folder / "project"), InputError);
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder / "project/data/mine.hdf5"));
   std::ofstream(folder / "d/notes.txt") << "x";
   EXPECT_THROW(write_demonstrations(sample({10}), folder / "d"), InputError);
   EXPECT_THROW(write_demonstrations(sample({10}), folder / "precious/thesis.tex"), InputError);

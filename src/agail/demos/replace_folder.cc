@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <set>
 #include <string>
 
 #include "agail/base/atomic_file.h"
@@ -46,6 +47,14 @@ void put_in_place(const fs::path& made, const fs::path& folder) {
   throw SystemError("cannot put " + folder.string() + " in place: " + std::strerror(errno));
 }
 
+bool holds_nothing_but(const std::set<fs::path>& names, const fs::path& folder) {
+  std::error_code error;
+  std::set<fs::path> there;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    there.insert(entry.path().filename());
+  return !error && there == names;
+}
+
 }  // namespace
 
 void check_replaceable_dataset(const fs::path& folder) {
@@ -55,10 +64,9 @@ void check_replaceable_dataset(const fs::path& folder) {
     throw InputError(folder.string() +
                      " is a file; end the name in .hdf5 for one file, or give a new folder");
   if (fs::is_empty(folder, error)) return;
-  bool dataset = fs::exists(folder / "data" / "metadata.json", error);
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    dataset = dataset && entry.path().filename() == "data";
-  if (!dataset || error)
+  // Whatever else lies there is somebody's.
+  if (!holds_nothing_but({"data"}, folder) ||
+      !holds_nothing_but({"main_data.hdf5", "metadata.json"}, folder / "data"))
     throw InputError(
         folder.string() +
         " is a folder, and no Minari dataset that could be replaced; give another name");
