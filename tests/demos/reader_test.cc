@@ -147,6 +147,9 @@ TEST(Reader, IntegersInOneColumnAreDiscrete) {
   };
   EXPECT_TRUE(plain.read().action.discrete);
   EXPECT_EQ(plain.read().action.n, 3);
+  plain.mask = {1, 0, 1, 0};  // a 2 that stands in for a missing action
+  EXPECT_EQ(plain.read().action.n, 2);
+  plain.mask.clear();
   plain.root = [](Group& root) {
     root.write_attribute("action_space", R"({"type": "Discrete", "n": 2, "start": 0})");
   };

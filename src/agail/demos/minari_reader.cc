@@ -88,7 +88,10 @@ ActionSpace action_space_of(const std::vector<RawEpisode>& episodes, const json&
     if (!episode.actions) continue;
     space.dim = static_cast<int>(episode.actions->cols());
     integers = integers && episode.actions_are_integers;
-    largest = std::max(largest, episode.actions->maxCoeff());
+    // What stands in for a missing action says nothing.
+    for (Eigen::Index t = 0; t < episode.steps(); ++t)
+      if (!episode.available || (*episode.available)(t, 0) == 1)
+        largest = std::max(largest, (*episode.actions)(t, 0));
   }
   if (space.dim == 0) return space;
   if (integers && space.dim == 1) {
