@@ -125,6 +125,9 @@ TEST(RoundTrip, DatasetsAreFoundByTheirId) {
   EXPECT_THAT(read_demonstrations("hopper/partial-v0").metadata,
               testing::HasSubstr(R"("hopper/partial-v0")"));
   EXPECT_THROW(read_demonstrations("hopper/absent-v0"), InputError);
+  write_demonstrations(sample({10}), folder / "hopper/slash-v0/");
+  EXPECT_THAT(read_demonstrations("hopper/slash-v0").metadata,
+              testing::HasSubstr(R"("hopper/slash-v0")"));
   EXPECT_THROW(write_demonstrations(sample({10}), folder / "unversioned"), InputError);
   unsetenv("MINARI_DATASETS_PATH");
 }

@@ -38,6 +38,13 @@ bool locate_in_folder(const fs::path& folder, DatasetLocation& location) {
   return false;
 }
 
+// Absolute, and without a slash at the end, which would be a name of its own.
+fs::path plain(const fs::path& folder) {
+  std::error_code error;
+  const fs::path path = fs::weakly_canonical(fs::absolute(folder), error);
+  return path.has_filename() ? path : path.parent_path();
+}
+
 }  // namespace
 
 std::string minari_root() {
@@ -73,9 +80,8 @@ DatasetLocation locate_dataset(const std::string& path_or_id) {
 }
 
 std::string dataset_id_for(const std::string& folder) {
-  std::error_code error;
-  const fs::path here = fs::weakly_canonical(fs::absolute(folder), error);
-  const fs::path root = fs::weakly_canonical(fs::absolute(minari_root()), error);
+  const fs::path here = plain(folder);
+  const fs::path root = plain(minari_root());
   std::string below = here.lexically_relative(root).generic_string();
   if (!below.empty() && below != "." && !below.starts_with("..")) {
     if (!std::regex_match(below, id_form()))
