@@ -33,9 +33,23 @@ void prepare() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
+herr_t find_version(unsigned, const H5E_error2_t* error, void* found) noexcept {
+  if (error->desc != nullptr && std::strstr(error->desc, "version number") != nullptr)
+    *static_cast<bool*>(found) = true;
+  return 0;
+}
+
+// Of what just failed in HDF5: a sound file may be newer than our library.
+std::string reason() {
+  bool newer = false;
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, find_version, &newer);
+  return newer ? " is damaged, or in a newer format than HDF5 1.10's; write it again (h5py: "
+                 "libver=(\"earliest\", \"v110\"))"
+               : " cannot be read; the file is damaged, copy or record it again";
+}
+
 Handle own(hid_t id, Handle::Close close, const std::string& where) {
-  if (id < 0)
-    throw InputError(where + " cannot be read; the file is damaged, copy or record it again");
+  if (id < 0) throw InputError(where + reason());
   return Handle(id, close);
 }
 
@@ -198,6 +212,10 @@ DatasetInfo Group::describe(const std::string& name) const {
   const Handle space = own(H5Dget_space(dataset.id()), close_space, place);
 
   DatasetInfo info;
+  if (H5Tget_class(type.id()) == H5T_VLEN)  // Minari's JPEGs
+    throw InputError(
+        place +
+        " has entries of varying length, as stored images do; give one vector of numbers a step");
   const std::optional<Number> number = number_of(type.id());
   if (!number)
     throw InputError(place +
@@ -354,10 +372,16 @@ File File::open(const std::string& path) {
     throw InputError(path + " cannot be opened; check that you may read it");
   const Handle access = access_properties();
   const hid_t id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id());
-  if (id < 0)
+  if (id < 0) {
+    if (H5Fis_hdf5(path.c_str()) > 0)
+      throw InputError(
+          path +
+          " is open for writing elsewhere, was not closed, or is cut short; close it (or run "
+          "h5clear -s on it), or copy it again");
     throw InputError(
         path +
         " is not a complete HDF5 file; give a Minari file (.hdf5), a Minari dataset folder or id");
+  }
   File file = wrap(Handle(id, close_file), path);
   file.root_.file_bytes_ = bytes;
   return file;
