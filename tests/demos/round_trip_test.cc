@@ -117,6 +117,20 @@ TEST(RoundTrip, MetadataOfTheSourceIsKept) {
   }
 }
 
+TEST(RoundTrip, NotesGoThroughAnyNumberOfFiles) {
+  Demonstrations demonstrations = sample({10});
+  demonstrations.metadata =
+      R"({"author": ["A. Uthor"], "note": "mine", "ref_max_score": 3234.5, "year": 2024})";
+  const TemporaryFolder folder;
+  for (const std::string name : {"a.hdf5", "b.hdf5", "dataset", "c.hdf5"}) {
+    write_demonstrations(demonstrations, folder / name);
+    demonstrations = read_demonstrations(folder / name);
+    for (const char* kept : {R"("author":["A. Uthor"])", R"("note":"mine")",
+                             R"("ref_max_score":3234.5)", R"("year":2024)"})
+      EXPECT_THAT(demonstrations.metadata, testing::HasSubstr(kept));
+  }
+}
+
 TEST(RoundTrip, DatasetsAreFoundByTheirId) {
   const TemporaryFolder folder;
   setenv("MINARI_DATASETS_PATH", (folder / "").c_str(), 1);

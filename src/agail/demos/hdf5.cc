@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -85,7 +86,8 @@ Handle access_properties() {
   return list;
 }
 
-herr_t collect_name(hid_t, const char* name, const H5L_info_t*, void* names) noexcept {
+template <class Info>
+herr_t collect_name(hid_t, const char* name, const Info*, void* names) noexcept {
   try {
     static_cast<std::vector<std::string>*>(names)->emplace_back(name);
     return 0;
@@ -177,8 +179,17 @@ std::string Group::where(const std::string& name) const {
 
 std::vector<std::string> Group::names() const {
   std::vector<std::string> names;
-  if (H5Literate(handle_.id(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_name, &names) < 0)
-    throw InputError(where() + " cannot be listed; the file is damaged, copy or record it again");
+  if (H5Literate(handle_.id(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_name<H5L_info_t>,
+                 &names) < 0)
+    throw InputError(where() + reason());
+  return names;
+}
+
+std::vector<std::string> Group::attribute_names() const {
+  std::vector<std::string> names;
+  if (H5Aiterate2(handle_.id(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_name<H5A_info_t>,
+                  &names) < 0)
+    throw InputError(where() + reason());
   return names;
 }
 
@@ -282,17 +293,28 @@ std::optional<std::string> Group::text_attribute(const std::string& name) const 
   return text;
 }
 
-std::optional<std::int64_t> Group::integer_attribute(const std::string& name) const {
-  if (H5Aexists(handle_.id(), name.c_str()) <= 0) return std::nullopt;
+bool Group::read_number(const std::string& name, Number number, std::int64_t type,
+                        void* value) const {
+  if (H5Aexists(handle_.id(), name.c_str()) <= 0) return false;
   const std::string place = where() + ", attribute " + name;
   const Handle attribute =
       own(H5Aopen(handle_.id(), name.c_str(), H5P_DEFAULT), close_attribute, place);
-  const Handle type = own(H5Aget_type(attribute.id()), close_type, place);
+  const Handle stored = own(H5Aget_type(attribute.id()), close_type, place);
   const Handle space = own(H5Aget_space(attribute.id()), close_space, place);
-  if (number_of(type.id()) != Number::kInteger || H5Sget_simple_extent_npoints(space.id()) != 1)
-    return std::nullopt;
+  return number_of(stored.id()) == number && H5Sget_simple_extent_npoints(space.id()) == 1 &&
+         H5Aread(attribute.id(), type, value) >= 0;
+}
+
+std::optional<std::int64_t> Group::integer_attribute(const std::string& name) const {
   std::int64_t value = 0;
-  if (H5Aread(attribute.id(), H5T_NATIVE_INT64, &value) < 0) return std::nullopt;
+  if (!read_number(name, Number::kInteger, H5T_NATIVE_INT64, &value)) return std::nullopt;
+  return value;
+}
+
+std::optional<double> Group::real_attribute(const std::string& name) const {
+  double value = 0;
+  if (!read_number(name, Number::kReal, H5T_NATIVE_DOUBLE, &value) || !std::isfinite(value))
+    return std::nullopt;
   return value;
 }
 

@@ -64,8 +64,11 @@ class Group {
   // All of them, row-major, converted. `values` has the size that describe() tells.
   void read(const std::string& name, std::span<double> values) const;
 
+  std::vector<std::string> attribute_names() const;
+  // Nothing if there is none, or one of another kind, an infinite number or NaN included.
   std::optional<std::string> text_attribute(const std::string& name) const;
   std::optional<std::int64_t> integer_attribute(const std::string& name) const;
+  std::optional<double> real_attribute(const std::string& name) const;
 
   Group create_group(const std::string& name);
   void write(const std::string& name, const std::vector<std::size_t>& shape, Type type,
@@ -76,6 +79,7 @@ class Group {
 
  private:
   friend class File;
+  bool read_number(const std::string& name, Number number, std::int64_t type, void* value) const;
   void write_scalar(const std::string& name, std::int64_t type, const void* value);
   Handle handle_;
   std::string file_;

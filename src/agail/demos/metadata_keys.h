@@ -6,10 +6,6 @@ namespace agail {
 inline constexpr const char* kPatternKey = "missing_pattern";  // ours: how actions were removed
 inline constexpr const char* kRatioKey = "missing_ratio";  // ours: eta, for readers; never trusted
 
-inline constexpr const char* kTextKeys[] = {
-    "dataset_id",   "minari_version", "env_spec",       "eval_env_spec", "observation_space",
-    "action_space", "algorithm_name", "code_permalink", "description",   kPatternKey};
-
 // Lists of texts; in a single file as JSON.
 inline constexpr const char* kListKeys[] = {"author", "author_email", "requirements",
                                             "combined_datasets"};

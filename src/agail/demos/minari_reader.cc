@@ -23,25 +23,27 @@ namespace {
 
 using nlohmann::json;
 
-// The metadata of a single file: the attributes of its root that Minari or we would write.
-json root_metadata(const hdf5::Group& root) {
-  json metadata = json::object();
-  for (const char* key : kTextKeys)
-    if (const auto text = root.text_attribute(key)) metadata[key] = *text;
-  for (const char* key : kListKeys) {
-    const auto text = root.text_attribute(key);
-    if (!text) continue;
-    json list = json::parse(*text, nullptr, false);
-    metadata[key] = list.is_array() ? list : json::array({*text});
-  }
-  if (const auto count = root.integer_attribute("total_episodes"))
-    metadata["total_episodes"] = *count;
-  return metadata;
-}
-
 std::string text_of(const json& metadata, const char* key) {
   return metadata.contains(key) && metadata[key].is_string() ? metadata[key].get<std::string>()
                                                              : "";
+}
+
+// The metadata of a single file: the attributes of its root, Minari's, ours and whoever's, that are
+// one text or number.
+json root_metadata(const hdf5::Group& root) {
+  json metadata = json::object();
+  for (const std::string& key : root.attribute_names()) {
+    if (const auto text = root.text_attribute(key)) metadata[key] = *text;
+    if (const auto number = root.integer_attribute(key)) metadata[key] = *number;
+    if (const auto number = root.real_attribute(key)) metadata[key] = *number;
+  }
+  for (const char* key : kListKeys) {
+    const std::string text = text_of(metadata, key);
+    if (text.empty()) continue;
+    json list = json::parse(text, nullptr, false);
+    metadata[key] = list.is_array() ? list : json::array({text});
+  }
+  return metadata;
 }
 
 std::string environment_of(const json& metadata, const std::string& where) {
