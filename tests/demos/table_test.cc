@@ -77,10 +77,22 @@ TEST_F(Csv, SaysWhatIsWrong) {
   EXPECT_THAT(error("obs_0\n"), HasSubstr("no rows"));
   EXPECT_THAT(error(""), HasSubstr("obs_0"));
   EXPECT_THAT(error("episode,obs_0\n0,1\n0,2\n1,1\n1,2\n0,3\n"), HasSubstr("earlier episode"));
+  EXPECT_THAT(error("episode,obs_0\n9007199254740992,1\n9007199254740993,2\n"),
+              HasSubstr("0, 1, 2"));
+  EXPECT_THAT(error("obs_0,action_0\n1,1\n2,1e39\n3,1\n"),
+              HasSubstr("an action in row 1 is too large for float32"));
+  EXPECT_THAT(error("obs_0\n1e39\n2\n"), HasSubstr("(no error)"));
   EXPECT_THAT(error("obs_0,next_obs_0\n0,1\n5,6\n"), HasSubstr("not the observation of row 1"));
   EXPECT_THAT(error("episode,obs_0,terminated\n0,1,1\n0,2,0\n0,3,0\n"),
               HasSubstr("goes on after it"));
   EXPECT_THAT(error("obs_0,action,action_0\n0,1,1\n"), HasSubstr("one kind"));
+}
+
+TEST_F(Csv, ObservationsOf32BitsMustFit) {
+  write_file_atomically(folder_ / "t.csv", std::string_view("obs_0\n0\n-1e39\n"));
+  StepTable table = read_csv(folder_ / "t.csv", ignored_);
+  table.observations_are_float32 = true;
+  EXPECT_THROW(demonstrations_from(table, "E-v0", std::nullopt), InputError);
 }
 
 TEST_F(Csv, ChecksTheKnownActionSpace) {
@@ -190,6 +202,9 @@ TEST_F(Npz, SaysWhatIsWrong) {
   EXPECT_THAT(npz_error(zip({{"observations.npy", npy(">f8", "(2, 1)", doubles({0, 1}))}})),
               HasSubstr("big-endian"));
   EXPECT_THAT(npz_error(zip({{"observations.npy", "x"}})), HasSubstr("not a numpy array"));
+  const std::string long_shape = "(" + std::string(60000, '1') + ",)";
+  EXPECT_THAT(npz_error(zip({{"observations.npy", npy("<f8", long_shape, doubles({0, 1}))}})),
+              HasSubstr("damaged header"));
   EXPECT_THAT(
       npz_error(zip({observations, {"actions.npy", npy("<f8", "(5,)", doubles({0, 1, 2, 3, 4}))}})),
       HasSubstr("actions has 5 rows"));

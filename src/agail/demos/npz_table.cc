@@ -56,7 +56,9 @@ Array parse_npy(const std::vector<std::uint8_t>& bytes, const std::string& where
   std::size_t length = bytes[8] | static_cast<std::size_t>(bytes[9]) << 8;
   if (prefix == 12)
     length |= static_cast<std::size_t>(bytes[10]) << 16 | static_cast<std::size_t>(bytes[11]) << 24;
-  if (length > 65536 || bytes.size() < prefix + length) fail("has a damaged header");
+  // Plain numbers need some 100 bytes; std::regex takes stack for each.
+  if (length > 4096 || bytes.size() < prefix + length)
+    fail("has a damaged header, or does not hold plain numbers; use float32, float64 or int64");
   const std::string header(bytes.begin() + static_cast<std::ptrdiff_t>(prefix),
                            bytes.begin() + static_cast<std::ptrdiff_t>(prefix + length));
   std::smatch found;

@@ -16,6 +16,16 @@ bool flag(const std::vector<double>& flags, std::size_t row) {
 
 std::string row_name(std::size_t row) { return "row " + std::to_string(row); }
 
+// What is kept with 32 bits must not become infinite there. NaN passes.
+void fits_float32(const StepTable& table, const RowMatrix<double>& values,
+                  const std::string& what) {
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  for (Eigen::Index t = 0; t < values.rows(); ++t)
+    if ((values.row(t).array().abs() > kLargest).any())
+      throw InputError(table.where + ": " + what + " in " + row_name(static_cast<std::size_t>(t)) +
+                       " is too large for float32; use other units");
+}
+
 void check_table(const StepTable& table) {
   const auto bad = [&](const RowMatrix<double>& values, const std::string& what) {
     for (Eigen::Index t = 0; t < values.rows(); ++t)
@@ -23,12 +33,14 @@ void check_table(const StepTable& table) {
         throw InputError(table.where + ": " + what + " in " +
                          row_name(static_cast<std::size_t>(t)) +
                          " is empty, NaN or infinite; only actions may be missing");
+    if (table.observations_are_float32) fits_float32(table, values, what);
   };
   if (table.observations.rows() == 0) throw InputError(table.where + " has no rows");
   bad(table.observations, "an observation");
   if (table.next_observations) bad(*table.next_observations, "a next observation");
   if (table.actions.array().isInf().any())
     throw InputError(table.where + " has infinite actions; leave a missing action empty (NaN)");
+  fits_float32(table, table.actions, "an action");
   for (const auto* flags : {&table.terminations, &table.truncations})
     for (std::size_t row = 0; row < flags->size(); ++row)
       if ((*flags)[row] != 0 && (*flags)[row] != 1 && !std::isnan((*flags)[row]))
@@ -151,6 +163,9 @@ std::vector<std::size_t> split_at_changes(const std::vector<double>& ids,
   for (std::size_t row = 0; row < ids.size(); ++row) {
     if (!std::isfinite(ids[row]))
       throw InputError(where + ": the episode in " + row_name(row) + " is not a number");
+    if (std::abs(ids[row]) >= 0x1p53)  // from there two ids may be one double
+      throw InputError(where + ": the episode in " + row_name(row) +
+                       " has a number of 2^53 or more; use smaller ones, for example 0, 1, 2");
     if (row > 0 && ids[row] == ids[row - 1]) continue;
     if (!seen.insert(ids[row]).second)
       throw InputError(where + ": " + row_name(row) +
