@@ -89,7 +89,10 @@ void read_actions(const Group& group, RawEpisode& episode) {
 }
 
 void read_mask(const Group& group, RawEpisode& episode) {
-  if (group.kind("infos") != Kind::kGroup) return;
+  const Kind kind = group.kind("infos");
+  if (kind == Kind::kNothing) return;
+  if (kind != Kind::kGroup)  // there may be a mask behind it
+    throw InputError(group.where("infos") + " is a link or no group; store the group itself");
   const Group infos = group.group("infos");
   if (infos.kind("action_available") == Kind::kNothing) return;
   const Table table = read_table(infos, "action_available");
