@@ -156,6 +156,35 @@ TEST(Reader, IntegersInOneColumnAreDiscrete) {
   EXPECT_THAT(plain.error(), AllOf(HasSubstr("episode_0/actions"), HasSubstr("from 0 to 1")));
 }
 
+TEST(Reader, DiscreteObservationsBecomeOneHot) {
+  Plain plain;
+  plain.observation_shape = {4};
+  plain.observations = {1, 3, 2, 1};
+  plain.root = [](Group& root) {
+    root.write_attribute("observation_space", R"({"type": "Discrete", "n": 3, "start": 1})");
+  };
+  RowMatrix<double> expected(4, 3);
+  expected << 1, 0, 0, 0, 0, 1, 0, 1, 0, 1, 0, 0;
+  const Demonstrations once = plain.read();
+  EXPECT_EQ(once.observation_dim, 3);
+  EXPECT_EQ(once.episodes[0].observations, expected);
+  const Demonstrations twice = read_demonstrations(encode_demonstrations(once), "again");
+  EXPECT_EQ(twice.episodes[0].observations, expected);
+  EXPECT_THAT(twice.metadata, HasSubstr(R"(\"Box\", \"dtype\": \"float32\", \"shape\": [3])"));
+  plain.observations[1] = 4;
+  EXPECT_THAT(plain.error(),
+              AllOf(HasSubstr("episode_0/observations: row 1 has 4"), HasSubstr("from 1 to 3")));
+}
+
+TEST(Reader, AnObservationSpaceThatIsNoJsonIsReplaced) {
+  Plain plain;
+  plain.root = [](Group& root) {
+    root.write_attribute("observation_space", std::string("Box(-inf, inf, (2,), float64)"));
+  };
+  EXPECT_THAT(read_demonstrations(encode_demonstrations(plain.read()), "again").metadata,
+              HasSubstr(R"(\"type\": \"Box\")"));
+}
+
 // Each message says what and where.
 TEST(Reader, RefusesWhatDoesNotFit) {
   const auto broken = [](const std::function<void(Plain&)>& change) {
@@ -215,6 +244,19 @@ TEST(Reader, RefusesWhatDoesNotFit) {
                 };
               }),
               HasSubstr("only Box and Discrete"));
+  EXPECT_THAT(broken([](Plain& p) {
+                p.root = [](Group& r) {
+                  r.write_attribute("observation_space", R"({"type": "Discrete", "n": 9999999})");
+                };
+              }),
+              HasSubstr("n from 1 to 65536"));
+  EXPECT_THAT(broken([](Plain& p) {
+                p.episode = [](Group& e) {
+                  const std::uint8_t mask[] = {1, 0, 1, 0};
+                  e.write("infos", {4}, Type::kUint8, mask);
+                };
+              }),
+              HasSubstr("episode_0/infos is a link or no group"));
   EXPECT_THAT(broken([](Plain& p) {
                 p.root = [](Group& r) {
                   r.write_attribute("action_space", R"({"type": "Discrete", "n": 2})");

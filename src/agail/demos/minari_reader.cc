@@ -145,12 +145,31 @@ DemoEpisode finish(RawEpisode raw, const ActionSpace& space) {
   return episode;
 }
 
+// A number of a Discrete space becomes a row that is 1 in its place, as environments with such a
+// space give it.
+void make_one_hot(RawEpisode& episode, const DiscreteSpace& space) {
+  const RowMatrix<double> numbers = std::move(episode.observations);
+  episode.observations.setZero(numbers.rows(), space.n);
+  episode.observations_are_float32 = true;
+  for (Eigen::Index t = 0; t < numbers.rows(); ++t) {
+    const double place = numbers(t, 0) - static_cast<double>(space.start);
+    if (!(place >= 0 && place < space.n && std::floor(place) == place))
+      throw InputError(
+          episode.where + "/observations: row " + std::to_string(t) + " has " +
+          json(numbers(t, 0)).dump() + "; the observation space has the whole numbers from " +
+          std::to_string(space.start) + " to " + std::to_string(space.start + space.n - 1));
+    episode.observations(t, static_cast<Eigen::Index>(place)) = 1;
+  }
+}
+
 // Demonstrations are held in memory; whether they fit is found out before anything is read.
-void check_memory(const hdf5::Group& root, const std::vector<std::string>& names) {
+void check_memory(const hdf5::Group& root, const std::vector<std::string>& names,
+                  const std::optional<DiscreteSpace>& discrete) {
   std::uint64_t kept = 0, passing = 0;
   for (const std::string& name : names) {
     const EpisodeMemory memory = memory_of_episode(root.group(name));
     kept += memory.kept;
+    if (discrete) kept += sizeof(double) * memory.observations * static_cast<unsigned>(discrete->n);
     passing = std::max(passing, memory.passing);
   }
   require_memory(kept + passing, root.where());
@@ -169,7 +188,9 @@ Demonstrations read(const hdf5::Group& root, const json& metadata, const std::st
     throw InputError(where + " says there are " + metadata["total_episodes"].dump() +
                      " episodes, the file holds " + std::to_string(names.size()) +
                      "; it is incomplete, copy or record it again");
-  check_memory(root, names);
+  const std::optional<DiscreteSpace> discrete = discrete_space_from_json(
+      text_of(metadata, "observation_space"), where + ": observation_space");
+  check_memory(root, names, discrete);
 
   Demonstrations demonstrations;
   demonstrations.environment = environment_of(metadata, where);
@@ -180,7 +201,8 @@ Demonstrations read(const hdf5::Group& root, const json& metadata, const std::st
   bool float32 = true;
   for (const std::string& name : names) {
     episodes.push_back(read_episode(root.group(name)));
-    const RawEpisode& episode = episodes.back();
+    RawEpisode& episode = episodes.back();
+    if (discrete && episode.observations.cols() == 1) make_one_hot(episode, *discrete);
     if (episode.observations.cols() != episodes.front().observations.cols())
       throw InputError(
           episode.where + "/observations has " + std::to_string(episode.observations.cols()) +

@@ -100,7 +100,7 @@ std::string observation_space(const json& source, const Demonstrations& demonstr
   const bool float32 = demonstrations.observations_are_float32;
   if (source.contains("observation_space") && source["observation_space"].is_string()) {
     auto text = source["observation_space"].get<std::string>();
-    const json space = parse_python_json(text, "observation_space");
+    const json space = space_from_json(text);
     if (space.is_object() && space.value("shape", json()) == json::array({dim}) &&
         space.value("dtype", json()) == (float32 ? "float32" : "float64"))
       return text;

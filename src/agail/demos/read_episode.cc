@@ -158,8 +158,9 @@ EpisodeMemory memory_of_episode(const Group& group) {
   const bool has_infos = group.kind("infos") == Kind::kGroup;
   const std::uint64_t mask = has_infos ? entries(group.group("infos"), "action_available") : 0;
   EpisodeMemory memory;
-  memory.kept = kNumber * (entries(group, "observations") + actions + rewards) +
-                kFlag * (actions + mask + flags);
+  memory.observations = entries(group, "observations");
+  memory.kept =
+      kNumber * (memory.observations + actions + rewards) + kFlag * (actions + mask + flags);
   // Whatever is not kept as numbers is read as numbers first.
   memory.passing = kNumber * std::max({rewards, flags, mask});
   return memory;

@@ -26,8 +26,9 @@ struct RawEpisode {
 
 // What reading an episode will take, in bytes.
 struct EpisodeMemory {
-  std::uint64_t kept = 0;     // as long as the demonstrations are there
-  std::uint64_t passing = 0;  // on top, while it is read
+  std::uint64_t kept = 0;          // as long as the demonstrations are there
+  std::uint64_t passing = 0;       // on top, while it is read
+  std::uint64_t observations = 0;  // not bytes: the entries of all observations
 };
 
 // From the shapes alone. Throws InputError where a dataset cannot be described.

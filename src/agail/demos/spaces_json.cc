@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kMostActions = 1 << 16;
+constexpr int kMostNumbers = 1 << 16;
 
 // Bare Infinity, -Infinity and NaN as strings; what stands inside of strings is left alone.
 std::string quote_constants(const std::string& text) {
@@ -94,6 +94,29 @@ json parse_python_json(const std::string& text, const std::string& where) {
   return parsed;
 }
 
+json space_from_json(const std::string& text) {
+  try {
+    return parse_python_json(text, "");
+  } catch (const InputError&) {
+    return json();
+  }
+}
+
+std::optional<DiscreteSpace> discrete_space_from_json(const std::string& text,
+                                                      const std::string& where) {
+  const json space = space_from_json(text);
+  if (!space.is_object() || space.value("type", json()) != "Discrete") return std::nullopt;
+  constexpr std::int64_t kFurthest = std::int64_t{1}
+                                     << 53;  // to there doubles tell whole numbers apart
+  const json n = space.value("n", json());
+  const json start = space.value("start", json(0));
+  if (!n.is_number_integer() || n < 1 || n > kMostNumbers || !start.is_number_integer() ||
+      start < -kFurthest || start > kFurthest)
+    throw InputError(where + ": a Discrete space needs n from 1 to " +
+                     std::to_string(kMostNumbers) + ", and a start within 2^53");
+  return DiscreteSpace{.start = start.get<std::int64_t>(), .n = n.get<int>()};
+}
+
 std::string action_space_to_json(const ActionSpace& space, bool is_float32) {
   if (space.discrete)
     return R"({"type": "Discrete", "dtype": "int64", "start": 0, "n": )" + std::to_string(space.n) +
@@ -119,9 +142,9 @@ ActionSpace action_space_from_json(const std::string& text, const std::string& w
   ActionSpace space;
   if (field("type") == "Discrete") {
     const json n = field("n");
-    if (!n.is_number_integer() || n < 1 || n > kMostActions)
+    if (!n.is_number_integer() || n < 1 || n > kMostNumbers)
       throw InputError(where + ": a Discrete action space needs n from 1 to " +
-                       std::to_string(kMostActions));
+                       std::to_string(kMostNumbers));
     if (!field("start").is_null() && field("start") != 0)
       throw InputError(
           where + ": a Discrete action space must start at 0; subtract the start from the actions");
@@ -136,7 +159,7 @@ ActionSpace action_space_from_json(const std::string& text, const std::string& w
         ": only Box and Discrete action spaces are supported; flatten the actions into one Box");
   const json shape = field("shape");
   if (!shape.is_array() || shape.size() != 1 || !shape[0].is_number_integer() || shape[0] < 1 ||
-      shape[0] > kMostActions)
+      shape[0] > kMostNumbers)
     throw InputError(where + ": the action space must be a vector; flatten the actions");
   space.dim = shape[0].get<int>();
   space.low = bounds(field("low"), static_cast<std::size_t>(space.dim), where);

@@ -1,7 +1,9 @@
 // Spaces as Minari writes them into its metadata.
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "agail/base/spaces.h"
@@ -20,5 +22,19 @@ std::string observation_space_to_json(int dim, bool is_float32);
 // Throws InputError, starting with `where`, for any other kind of space, and for bounds that do not
 // fit the shape.
 ActionSpace action_space_from_json(const std::string& text, const std::string& where);
+
+// The whole numbers from `start` to `start` + `n` - 1.
+struct DiscreteSpace {
+  std::int64_t start = 0;
+  int n = 0;
+};
+
+// None for any other kind of space. Throws InputError, starting with `where`, for one that is too
+// large.
+std::optional<DiscreteSpace> discrete_space_from_json(const std::string& text,
+                                                      const std::string& where);
+
+// Any space; null for what is no JSON, such as Python's str(space).
+nlohmann::json space_from_json(const std::string& text);
 
 }  // namespace agail
