@@ -322,6 +322,72 @@ def test_wrong_input_is_one_line_and_exit_2(datasets, arguments):
     assert not (datasets / "x.hdf5").exists()
 
 
+def small(path, **file_options):
+    """A file as one would write it with h5py, open."""
+    file = h5py.File(path, "w", **file_options)
+    episode = file.create_group("episode_0")
+    episode["observations"] = np.arange(8.0).reshape(4, 2)
+    episode["actions"] = np.zeros((3, 1))
+    episode["infos/action_available"] = np.array([1, 0, 1, 0], np.uint8)
+    return file
+
+
+def refusal(path):
+    error = agail("inspect", path, status=2)
+    assert len(error.strip().splitlines()) == 1 and str(path) in error
+    return error
+
+
+def test_a_mask_behind_a_link_is_refused(tmp_path):
+    with small(tmp_path / "a.hdf5") as file:
+        file["masks/0"] = file["episode_0/infos"]
+        del file["episode_0/infos"]
+        file["episode_0/infos"] = h5py.SoftLink("/masks/0")
+    assert "episode_0/infos is a link" in refusal(tmp_path / "a.hdf5")
+    with small(tmp_path / "b.hdf5") as file:
+        file.move("episode_0/infos/action_available", "mask")
+        file["episode_0/infos/action_available"] = h5py.SoftLink("/mask")
+    assert "infos/action_available is a link" in refusal(tmp_path / "b.hdf5")
+
+
+def test_a_file_that_is_still_open_is_told_from_another(tmp_path):
+    with small(tmp_path / "a.hdf5") as file:
+        file.flush()
+        assert "open for writing elsewhere" in refusal(tmp_path / "a.hdf5")
+    assert inspect(tmp_path / "a.hdf5")["transitions"] == 3
+
+
+def test_formats_newer_than_ours_are_named(tmp_path):
+    with small(tmp_path / "a.hdf5", libver="v112") as file:
+        file["episode_0/terminations"] = np.array([False, False, True])
+    error = refusal(tmp_path / "a.hdf5")
+    assert "episode_0/terminations" in error and "newer format" in error and "libver" in error
+    with small(tmp_path / "b.hdf5", libver=("earliest", "v110")) as file:
+        file["episode_0/terminations"] = np.array([False, False, True])
+    assert inspect(tmp_path / "b.hdf5")["transitions"] == 3
+
+
+def test_encoded_images_are_refused_as_such(tmp_path):
+    with small(tmp_path / "a.hdf5") as file:
+        del file["episode_0/observations"]
+        images = file["episode_0"].create_dataset("observations", (4,), h5py.vlen_dtype(np.uint8))
+        images[...] = [np.frombuffer(b"jpeg" * n, np.uint8) for n in range(1, 5)]
+    assert "as stored images do" in refusal(tmp_path / "a.hdf5")
+
+
+def test_discrete_observations_are_one_hot(datasets):
+    buffer = EpisodeBuffer(
+        observations=np.array([0, 4, 8, 9]), actions=np.array([1, 1, 2]), rewards=[0.0] * 3,
+        terminations=[False] * 3, truncations=[False, False, True],
+    )  # fmt: skip
+    minari.create_dataset_from_buffers("lake-v0", [buffer], env="FrozenLake-v1")
+    assert inspect("lake-v0")["observation_dim"] == 16
+    agail("mask", "lake-v0", "--missing", "0.34", "--out", datasets / "part-v0")
+    part = minari.load_dataset("part-v0")
+    assert part.observation_space == gym.spaces.Box(-np.inf, np.inf, (16,), np.float32)
+    np.testing.assert_array_equal(part[0].observations.argmax(axis=1), [0, 4, 8, 9])
+
+
 def test_damaged_files_of_h5py_are_refused_or_read(tmp_path, datasets):
     """h5py's default format has no checksums, so damage reaches HDF5's own code."""
     cartpole()
