@@ -2,7 +2,8 @@
 
 #include <unistd.h>
 
-#include <fstream>
+#include <set>
+#include <string>
 
 #include "base/messages.h"
 #include "base/temporary_folder.h"
@@ -37,6 +38,39 @@ TEST(AtomicFile, KeepsTheOldFileAndCleansUpWhenItFails) {
     EXPECT_THAT(error.what(), HasSubstr("/dev/full"));
     EXPECT_THAT(error.what(), HasSubstr("Not a directory"));
   }
+}
+
+TEST(AtomicFile, CreatesOnlyWhatIsNotThere) {
+  const TemporaryFolder folder;
+  EXPECT_TRUE(create_file_atomically(folder / "x", "first"));
+  EXPECT_FALSE(create_file_atomically(folder / "x", "second"));
+  EXPECT_EQ(read_file(folder / "x"), (Bytes{'f', 'i', 'r', 's', 't'}));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
+// Process ids are equal in two containers that share a file system.
+TEST(AtomicFile, NoTemporaryNameTwice) {
+  const TemporaryFolder folder;
+  std::set<std::string> names;
+  for (int i = 0; i < 2; ++i) {
+    // A name that is too long tells the temporary one.
+    try {
+      write_file_atomically(folder / std::string(250, 'x'), "text");
+    } catch (const SystemError& error) {
+      names.insert(error.what());
+    }
+  }
+  EXPECT_EQ(names.size(), 2U);
+}
+
+TEST(AtomicFile, LooksOnlyWhereOneCan) {
+  const TemporaryFolder folder;
+  write_file_atomically(folder / "file", "text");
+  EXPECT_TRUE(is_there(folder.path()));
+  EXPECT_FALSE(is_there(folder / "none"));
+  EXPECT_FALSE(is_there(folder / "file/below"));
+  EXPECT_THAT(input_error([&] { is_there(folder / std::string(300, 'x')); }),
+              HasSubstr("File name too long"));
 }
 
 TEST(AtomicFile, OutputFolder) {

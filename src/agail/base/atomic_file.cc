@@ -1,10 +1,13 @@
 #include "agail/base/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <string>
 #include <system_error>
@@ -40,10 +43,14 @@ fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
-// The name carries the process id so that two processes never write into one temporary file.
+// Random, so that two processes never write into one temporary file: process ids can be equal on
+// machines and in containers that share a file system.
 fs::path temporary_name(const fs::path& path) {
-  return folder_of(path) /
-         ("." + path.filename().string() + "." + std::to_string(::getpid()) + ".tmp");
+  std::uint64_t number = 0;
+  if (::getrandom(&number, sizeof number, 0) != sizeof number) fail("name a file beside", path);
+  std::array<char, 17> digits{};
+  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(number));
+  return folder_of(path) / ("." + path.filename().string() + "." + digits.data() + ".tmp");
 }
 
 void write_bytes(const fs::path& path, std::span<const std::uint8_t> bytes) {
@@ -98,6 +105,20 @@ void write_file_atomically(const fs::path& path, std::string_view text) {
   write_file_atomically(path, std::span(bytes, text.size()));
 }
 
+bool create_file_atomically(const fs::path& path, std::string_view text) {
+  const fs::path whole = temporary_name(path);
+  write_file_atomically(whole, text);
+  bool created = ::link(whole.c_str(), path.c_str()) == 0;
+  if (!created && errno != EEXIST && ::access(path.c_str(), F_OK) != 0) {
+    // A file system without hard links: whoever comes at the same moment is not noticed.
+    if (::rename(whole.c_str(), path.c_str()) != 0) fail("write", path);
+    created = true;
+  }
+  ::unlink(whole.c_str());
+  sync_folder(folder_of(path));
+  return created;
+}
+
 void create_output_folder(const fs::path& folder) {
   if (folder.empty()) return create_output_folder(".");
   std::error_code error;
@@ -109,6 +130,13 @@ void create_output_folder(const fs::path& folder) {
   if (error)
     throw InputError("cannot create files in " + folder.string() + ": " + error.message() +
                      "; give --out a place that you can write to");
+}
+
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  const bool found = fs::exists(path, error);
+  if (error) throw InputError("cannot open " + path.string() + ": " + error.message());
+  return found;
 }
 
 std::vector<std::uint8_t> read_file(const fs::path& path, std::size_t max_bytes) {

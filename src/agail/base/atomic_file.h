@@ -19,10 +19,16 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 void write_file_atomically(const std::filesystem::path& path,
                            const std::function<void(const std::filesystem::path&)>& fill);
 
+// The same, unless something is there already: of several who do this at once one alone gets true.
+bool create_file_atomically(const std::filesystem::path& path, std::string_view text);
+
 // Creates a folder that the user named (and its parents) and makes sure that files can be created
 // in it: InputError if not. For an output file, pass its parent; an empty path is the current
 // folder.
 void create_output_folder(const std::filesystem::path& folder);
+
+// InputError if it cannot be told: no permission, a name that is too long.
+bool is_there(const std::filesystem::path& path);
 
 // InputError if the file cannot be opened or is larger than `max_bytes`; SystemError if reading
 // fails.

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "agail/base/error.h"
+#include "agail/base/file_lock.h"
 #include "agail/base/interrupt.h"
 #include "agail/reproduce/child_process.h"
 
@@ -74,7 +75,7 @@ class Scheduler {
  private:
   struct Running {
     std::size_t job;
-    JobLock lock;
+    FileLock lock;
     std::size_t step = 0;
     pid_t process = 0;
   };
@@ -134,7 +135,7 @@ class Scheduler {
       }
       const bool place = running_.size() < static_cast<std::size_t>(at_once_);
       if (!ready || !(place || look_elsewhere) || note_if_done(i) || !place) continue;
-      JobLock lock(jobs_[i].lock);
+      FileLock lock(jobs_[i].lock);
       if (!lock.held()) {
         status.state = JobState::kElsewhere;
       } else if (!note_if_done(i)) {  // nobody finished it between the two looks
