@@ -22,4 +22,8 @@ def small(agail, tmp_path_factory):
         )
         agail("record", expert, "--episodes", 6, "--out", whole)
         agail("mask", whole, "--missing", 0.5, "--out", folder / f"{name}-part.hdf5")
+    agail(
+        "mask", folder / "hopper.hdf5", "--missing", 0.33, "--pattern", "dimension",
+        "--dimension", 2, "--out", folder / "hopper-no-foot.hdf5",
+    )  # fmt: skip
     return folder

@@ -32,10 +32,16 @@ TASKS = {  # environment, demonstrations, options
     ),
 }
 
+# Only for some tests: without updates, and with a start that explores (no demonstration tells the foot's torque).
+OTHER_TASKS = {
+    "bc": ("CartPole-v1", "cartpole-part.hdf5", ["--method", "bc"]),
+    "agail-exploring": ("Hopper-v5", "hopper-no-foot.hdf5", ["--method", "agail"]),
+}
+
 
 def train(small, task, out, timesteps, *more):
-    """The arguments of `agail` for one of TASKS."""
-    environment, demos, options = TASKS[task]
+    """The arguments of `agail` for one of TASKS or OTHER_TASKS."""
+    environment, demos, options = {**TASKS, **OTHER_TASKS}[task]
     given = ["--demos", small / demos] if demos else []
     return [
         "train", environment, "--out", out, "--timesteps", timesteps,
@@ -54,6 +60,11 @@ def learned(run):
     return [{k: v for k, v in row.items() if k not in clocked} for row in progress(run)]
 
 
+def evaluations(run):
+    summary = json.loads((run / "summary.json").read_text())
+    return {key: value for key, value in summary.items() if key.endswith("_evaluation")}
+
+
 def assert_same_result(run, reference):
     for policy in reference.glob("*.safetensors"):
         if policy.name == "policy_best.safetensors":
@@ -66,6 +77,7 @@ def assert_same_result(run, reference):
     checkpoint = "checkpoints/latest.safetensors"
     assert (run / checkpoint).read_bytes() == (reference / checkpoint).read_bytes()
     assert learned(run) == learned(reference)
+    assert evaluations(run) == evaluations(reference)
     for name in ("config.toml", "episodes.csv"):
         assert (run / name).read_bytes() == (reference / name).read_bytes(), name
 
@@ -299,12 +311,49 @@ def test_cut_off_before_the_first_checkpoint(agail, small, tmp_path):
         assert_same_result(run, reference)
 
 
-def test_resume_of_a_finished_run_changes_nothing(agail, small, tmp_path):
+@pytest.mark.parametrize("task", ["trpo", "gail-cloned", "bc"])
+def test_resume_of_a_finished_run_changes_nothing(agail, small, tmp_path, task):
     run = tmp_path / "run"
-    agail(*train(small, "trpo", run, 1024))
-    policy, rows = (run / "policy.safetensors").read_bytes(), learned(run)
-    agail(*train(small, "trpo", run, 1024, "--resume"))
+    told = agail(*train(small, task, run, 1024))
+    policy, rows, before = (run / "policy.safetensors").read_bytes(), learned(run), evaluations(run)
+    assert "last_evaluation" in before and ("best_evaluation" in before) == (task == "trpo")
+    assert agail(*train(small, task, run, 1024, "--resume")) == told
     assert (run / "policy.safetensors").read_bytes() == policy and learned(run) == rows
+    assert evaluations(run) == before
+    assert "seed" in agail.refused(*train(small, task, run, 1024, "--resume", "--seed", 1))
+
+
+@pytest.mark.parametrize("task", [*TASKS, "agail-exploring"])
+def test_killed_before_the_first_regular_checkpoint(agail, small, tmp_path, task):
+    """It goes on from its start, with the same bits, and only as what it was started as."""
+    run, reference = tmp_path / "run", tmp_path / "reference"
+    process = agail.start(*train(small, task, run, 10**8, "--set=run.checkpoint_every=1000000"))
+    wait_for_rows(process, run, 1)
+    process.kill()
+    process.wait()
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert "seed" in agail.refused(*train(small, task, run, 1024, "--resume", "--seed", 1))
+    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+    agail(*train(small, task, run, 1024, "--resume", "--threads", 2))
+    agail(*train(small, task, reference, 1024))
+    assert_same_result(run, reference)
+    assert_tensorboard_agrees(run)
+
+
+def test_two_processes_in_one_folder(agail, small, tmp_path):
+    run = tmp_path / "run"
+    process = agail.start(*train(small, "trpo", run, 10**8))
+    try:
+        wait_for_rows(process, run, 3)
+        for more in ([], ["--resume"], ["--resume", "--seed", 1]):
+            told = agail.refused(*train(small, "trpo", run, 10**8, *more))
+            assert "another agail is training in this folder" in told
+    finally:
+        process.terminate()
+        assert process.wait(60) == 128 + signal.SIGTERM
+    end = int(progress(run)[-1]["time/total_timesteps"]) + 256
+    agail(*train(small, "trpo", run, end, "--resume"))
+    assert_tensorboard_agrees(run)
 
 
 def test_resume_takes_its_settings_from_the_run(agail, small, tmp_path):

@@ -14,7 +14,9 @@ namespace agail {
 
 namespace {
 
-constexpr const char* kFormat = "agail-checkpoint-1";
+constexpr const char* kFormat = "agail-checkpoint-2";
+// Has of the evaluations the best return only; runs that it is of can go on.
+constexpr const char* kOlderFormat = "agail-checkpoint-1";
 
 std::map<std::string, std::string> identity(const Trainer& trainer) {
   const TrainingTask& task = trainer.task();
@@ -33,15 +35,29 @@ std::map<std::string, std::string> identity(const Trainer& trainer) {
   return result;
 }
 
-void walk(Archive& archive, Trainer& trainer, double& best_return) {
-  archive("best_return", best_return);
+void walk(Archive& archive, const char* name, std::optional<Evaluation>& evaluation) {
+  Evaluation value = evaluation.value_or(Evaluation{});  // without episodes: none
+  archive.scope(name, [&](Archive& inner) {
+    inner.resizable("returns", value.returns);
+    inner.resizable("lengths", value.lengths);
+    inner("diverged", value.diverged);
+  });
+  evaluation = value.returns.empty() ? std::nullopt : std::optional(std::move(value));
+}
+
+void walk(Archive& archive, Trainer& trainer, RunEvaluations& evaluations, bool older) {
+  archive("best_return", evaluations.best_return);
+  if (!older) {
+    walk(archive, "best_evaluation", evaluations.best);
+    walk(archive, "last_evaluation", evaluations.last);
+  }
   archive.scope("trainer", [&](Archive& inner) { trainer.archive(inner); });
 }
 
 }  // namespace
 
 CheckpointFile::CheckpointFile(const std::filesystem::path& folder, const Trainer& trainer)
-    : file_(folder / "checkpoints" / "latest.safetensors"), identity_(identity(trainer)) {}
+    : file_(path(folder)), identity_(identity(trainer)) {}
 
 std::uint32_t CheckpointFile::fingerprint() const {
   std::string text = std::string(kVersion) + " " + cpu_features();
@@ -49,11 +65,11 @@ std::uint32_t CheckpointFile::fingerprint() const {
   return crc32c(std::vector<std::uint8_t>(text.begin(), text.end()));
 }
 
-void CheckpointFile::save(Trainer& trainer, double& best_return) const {
+void CheckpointFile::save(Trainer& trainer, RunEvaluations& evaluations) const {
   TensorStore store;
   store.metadata = identity_;
   Archive archive(store, Archive::Mode::kSave);
-  walk(archive, trainer, best_return);
+  walk(archive, trainer, evaluations, false);
   Communicator& communicator = trainer.team().communicator();
   const std::vector<std::uint8_t> bytes = to_safetensors(store);
   // The safety net of a state that is held by all: a machine that computes otherwise ends the job
@@ -64,7 +80,7 @@ void CheckpointFile::save(Trainer& trainer, double& best_return) const {
   if (communicator.rank() == 0) write_file_atomically(file_, bytes);
 }
 
-bool CheckpointFile::load(Trainer& trainer, double& best_return) const {
+bool CheckpointFile::load(Trainer& trainer, RunEvaluations& evaluations) const {
   Communicator& communicator = trainer.team().communicator();
   std::vector<std::uint8_t> bytes;  // none: no checkpoint
   together(communicator, [&] {
@@ -81,13 +97,15 @@ bool CheckpointFile::load(Trainer& trainer, double& best_return) const {
     std::ranges::copy(message, std::as_writable_bytes(std::span(bytes)).begin());
   }
   if (bytes.empty()) return false;
-  together(communicator, [&] { restore(bytes, trainer, best_return); });
+  together(communicator, [&] { restore(bytes, trainer, evaluations); });
   return true;
 }
 
 void CheckpointFile::restore(const std::vector<std::uint8_t>& bytes, Trainer& trainer,
-                             double& best_return) const {
+                             RunEvaluations& evaluations) const {
   TensorStore store = from_safetensors(bytes, file_.string(), Checksum::kRequired);
+  const bool older = store.metadata["format"] == kOlderFormat;
+  if (older) store.metadata["format"] = kFormat;
   for (const auto& [key, value] : identity_) {
     const auto found = store.metadata.find(key);
     if (found == store.metadata.end() || found->second != value)
@@ -96,7 +114,7 @@ void CheckpointFile::restore(const std::vector<std::uint8_t>& bytes, Trainer& tr
           "; resume with what the run was started with, or start a new run in another folder");
   }
   Archive archive(store, Archive::Mode::kLoad);
-  walk(archive, trainer, best_return);
+  walk(archive, trainer, evaluations, older);
 }
 
 }  // namespace agail

@@ -3,12 +3,21 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <map>
+#include <optional>
 #include <string>
 
+#include "agail/train/evaluation.h"
 #include "agail/train/trainer.h"
 
 namespace agail {
+
+// What a run knows of its evaluations.
+struct RunEvaluations {
+  double best_return = -std::numeric_limits<double>::max();
+  std::optional<Evaluation> best, last;
+};
 
 class CheckpointFile {
  public:
@@ -18,17 +27,22 @@ class CheckpointFile {
   // Of the task, the version and the machine's instructions: ranks that train together must agree.
   std::uint32_t fingerprint() const;
 
-  // `best_return`: of the best evaluation so far. For all ranks together; rank 0 writes.
-  void save(Trainer& trainer, double& best_return) const;
+  static std::filesystem::path path(const std::filesystem::path& folder) {
+    return folder / "checkpoints" / "latest.safetensors";
+  }
+
+  // For all ranks together; rank 0 writes.
+  void save(Trainer& trainer, RunEvaluations& evaluations) const;
 
   // Returns false if there is no checkpoint. For all ranks together; only rank 0 reads the file,
   // and it may be of a run with another number of ranks. InputError if it belongs to another task
   // (environment, method, seed, settings other than run.timesteps and run.checkpoint_every,
   // demonstrations), naming what differs.
-  bool load(Trainer& trainer, double& best_return) const;
+  bool load(Trainer& trainer, RunEvaluations& evaluations) const;
 
  private:
-  void restore(const std::vector<std::uint8_t>& bytes, Trainer& trainer, double& best_return) const;
+  void restore(const std::vector<std::uint8_t>& bytes, Trainer& trainer,
+               RunEvaluations& evaluations) const;
 
   std::filesystem::path file_;
   std::map<std::string, std::string> identity_;

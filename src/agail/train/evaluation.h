@@ -25,8 +25,7 @@ std::pair<double, double> bootstrap_interval(const std::vector<double>& values, 
 
 // Episode e is the same for any number of threads and ranks (which share the episodes): reset and
 // actions have streams of their own.
-// Takes the mode of the policy unless `stochastic`. Stops early, with the episodes that are whole,
-// when interrupted() becomes true.
+// Takes the mode of the policy unless `stochastic`.
 Evaluation evaluate(const SavedPolicy& policy, Index episodes, std::uint64_t seed, bool stochastic,
                     Team team);
 

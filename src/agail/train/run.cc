@@ -2,12 +2,12 @@
 
 #include <chrono>
 #include <cstdio>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "agail/base/atomic_file.h"
 #include "agail/base/build_info.h"
+#include "agail/base/file_lock.h"
 #include "agail/base/interrupt.h"
 #include "agail/comm/collectives.h"
 #include "agail/comm/together.h"
@@ -33,24 +33,24 @@ void remove_unfinished_files(const fs::path& folder) {
     if (is_unfinished(entry.path())) fs::remove(entry.path());
 }
 
-// What a run that was cut off before it began leaves behind: an empty checkpoints/ and unfinished
-// temporary files.
+// Other than what a run that was cut off before it began leaves behind: checkpoints/ without a
+// checkpoint and unfinished temporary files.
 bool holds_other_files(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const bool left_behind =
-        (entry.path().filename() == "checkpoints" && fs::is_empty(entry.path())) ||
-        is_unfinished(entry.path());
+        is_unfinished(entry.path()) || (entry.path().filename() == "checkpoints" &&
+                                        entry.is_directory() && !holds_other_files(entry.path()));
     if (!left_behind) return true;
   }
   return false;
 }
 
 void check_folder(const fs::path& folder, bool resume) {
-  const bool has_run = fs::exists(folder / "config.toml");
+  const bool has_run = is_there(folder / "config.toml") || is_there(CheckpointFile::path(folder));
   if (has_run && !resume)
     throw InputError(folder.string() +
                      ": there is a run in this folder; go on with --resume, or give another --out");
-  if (!has_run && fs::is_directory(folder) && holds_other_files(folder))
+  if (!has_run && holds_other_files(folder))
     throw InputError(folder.string() + ": the folder holds other files; give --out a new folder");
 }
 
@@ -123,7 +123,7 @@ class Run {
         communicator_(communicator),
         first_(communicator.rank() == 0) {
     together(communicator_, [&] {
-      if (first_) check_folder(folder_, options_.resume);
+      if (first_ && is_there(folder_) && fs::is_directory(folder_)) take_folder();
       // A task that makes no sense ends here, and leaves nothing behind.
       trainer_ = std::make_unique<Trainer>(std::move(task), communicator_);
     });
@@ -136,6 +136,16 @@ class Run {
   const RunOutcome& outcome() const { return outcome_; }
 
  private:
+  // On the first rank, once the folder exists: until this run ends nobody else trains in it.
+  void take_folder() {
+    if (lock_) return;
+    lock_.emplace(folder_);
+    if (!lock_->held())
+      throw InputError(folder_.string() +
+                       ": another agail is training in this folder; wait for its end, or give "
+                       "another --out");
+    check_folder(folder_, options_.resume);
+  }
   // Whether any rank noted a signal or was told to stop, known to all: they must stop after the
   // same update.
   bool must_stop() {
@@ -158,11 +168,12 @@ class Run {
   bool told_to_stop_ = false;
   Communicator& communicator_;
   bool first_;  // the rank that writes
+  std::optional<FolderLock> lock_;
   std::unique_ptr<Trainer> trainer_;
   std::optional<CheckpointFile> checkpoint_;
   std::optional<RunLog> log_;  // of the first rank
   RunOutcome outcome_;
-  double best_return_ = -std::numeric_limits<double>::max();
+  RunEvaluations evaluations_;
   std::int64_t saved_timesteps_ = -1;
 };
 
@@ -178,21 +189,27 @@ bool Run::prepare() {
                        "; give all ranks the same program and files on machines of one kind");
     if (!first_) return;
     create_output_folder(folder_);
+    take_folder();
     create_output_folder(folder_ / "checkpoints");
     remove_unfinished_files(folder_);
     remove_unfinished_files(folder_ / "checkpoints");
   });
   // Before a checkpoint replaces the start: a resumed run knows how good it was, too.
   if (trainer_->cloning() && trainer_->learns_by_interaction() && settings_.evaluate_every > 0)
-    outcome_.cloned = evaluate(trainer_->policy(), settings_.evaluation_episodes,
-                               trainer_->task().seed, false, trainer_->team());
-  const bool resumed = options_.resume && checkpoint_->load(*trainer_, best_return_);
+    or_abort(communicator_, [&] {
+      outcome_.cloned = evaluate(trainer_->policy(), settings_.evaluation_episodes,
+                                 trainer_->task().seed, false, trainer_->team());
+    });
+  // From here on a resume with another task is refused: the start is a checkpoint, too.
+  if (!options_.resume || !checkpoint_->load(*trainer_, evaluations_))
+    or_abort(communicator_, [&] { checkpoint_->save(*trainer_, evaluations_); });
+  saved_timesteps_ = trainer_->timesteps();
   together(communicator_, [&] {
     if (!first_) return;
     if (options_.shows_progress) tell_start(*trainer_);
     write_file_atomically(folder_ / "config.toml", trainer_->task().settings_toml);
     log_.emplace(folder_, settings_.timesteps,
-                 resumed ? std::optional(trainer_->timesteps()) : std::nullopt,
+                 options_.resume ? std::optional(trainer_->timesteps()) : std::nullopt,
                  options_.shows_progress);
   });
   return true;
@@ -200,20 +217,20 @@ bool Run::prepare() {
 
 std::optional<Evaluation> Run::evaluate_now() {
   const SavedPolicy policy = trainer_->policy();
-  outcome_.last = evaluate(policy, settings_.evaluation_episodes, trainer_->task().seed, false,
-                           trainer_->team());
+  const std::optional<Evaluation>& last = evaluations_.last = evaluate(
+      policy, settings_.evaluation_episodes, trainer_->task().seed, false, trainer_->team());
   // An imitator has no true reward to select by.
-  if (trainer_->task().method == "trpo" && outcome_.last->mean_return() > best_return_) {
-    best_return_ = outcome_.last->mean_return();
-    outcome_.best = outcome_.last;
+  if (trainer_->task().method == "trpo" && last->mean_return() > evaluations_.best_return) {
+    evaluations_.best_return = last->mean_return();
+    evaluations_.best = last;
     if (first_) policy.save(folder_ / "policy_best.safetensors");
   }
-  return outcome_.last;
+  return last;
 }
 
 void Run::save() {
   if (first_) log_->flush();  // what the checkpoint has seen is in the log
-  checkpoint_->save(*trainer_, best_return_);
+  checkpoint_->save(*trainer_, evaluations_);
   saved_timesteps_ = trainer_->timesteps();
 }
 
@@ -238,6 +255,8 @@ void Run::train() {
 
   must_stop();
   outcome_.timesteps = trainer.timesteps();
+  outcome_.best = evaluations_.best;
+  outcome_.last = evaluations_.last;
   const Traffic traffic = total_of(communicator_, communicator_.traffic());
   if (!first_) return;
   log_->finish();

@@ -30,11 +30,11 @@ struct RunOptions {
   std::function<bool(std::span<const double> row)> on_update{};
 };
 
-// Trains in `folder`. Without `resume` the folder must not hold a run; with it, the run goes on
-// from its checkpoint (from the start, if it was cut off before the first), to the same policy as
-// if it had never stopped. Several ranks call it together, with equal tasks; rank 0 alone reads and
-// writes the folder, and all have the same outcome. A failure once training has begun ends all
-// ranks (or_abort).
+// Trains in `folder`, which nobody else may train in meanwhile (InputError). Without `resume` the
+// folder must not hold a run; with it, the run goes on from its checkpoint (from the start, if it
+// was cut off before the first), to the same policy as if it had never stopped. Several ranks call
+// it together, with equal tasks; rank 0 alone reads and writes the folder, and all have the same
+// outcome. A failure once training has begun ends all ranks (or_abort).
 RunOutcome run_training(TrainingTask task, const std::filesystem::path& folder, RunOptions options,
                         Communicator& communicator = no_other_ranks());
 
