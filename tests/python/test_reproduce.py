@@ -311,7 +311,11 @@ def test_a_run_that_fails_does_not_stop_the_others(agail, grid, tmp_path):
         (["table1", "--missing", "0.3"], "0.25"),
         (["table1", "--preset", "papr"], "paper"),
         (["table1", "--set", "trpo.gama=1"], "trpo.gamma"),
+        (["table1", "--set", "run.evaluate_every=3"], "run.evaluate_every"),
+        (["table1", "--set", "run.lanes=7"], "run.lanes"),
+        (["table1", "--set", "discriminator.features=[4]", *GRID[2:7]], "from 0 to 3"),
         (["table1", "--seeds", "-1"], "--seeds"),
+        (["table1", "--seeds", "010"], "--seeds"),
         (["table1", "--jobs", "0"], "--jobs"),
         (["table1", "--timesteps", "0"], "--timesteps"),
         (["table1", "--shard", "3/2"], "--shard 3/2"),
@@ -325,6 +329,21 @@ def test_wrong_input(agail, tmp_path, arguments, told):
     out = tmp_path / "out"
     assert told in agail.refused("reproduce", *arguments, "--out", out)
     assert not out.exists()
+
+
+def test_settings_that_only_other_methods_have(agail, grid, tmp_path):
+    """No discriminator is in a trpo run, so its features may be another environment's."""
+    agail(
+        *GRID[:5], "trpo", "--seeds", 0, "--timesteps", 1000, "--out", tmp_path,
+        "--set", "discriminator.features=[300]",
+    )  # fmt: skip
+
+
+def test_out_without_a_name(agail):
+    assert "--out" in agail.refused("reproduce", "table1", "--out", "")
+    assert "File name too long" in agail.refused("reproduce", "table1", "--out", "x" * 300)
+    told = agail.refused("reproduce", "table1", "--only-tables", "--out", "x" * 300)
+    assert "File name too long" in told
 
 
 def test_another_experiment_in_the_same_folder(agail, grid):

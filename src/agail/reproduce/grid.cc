@@ -6,9 +6,11 @@
 
 #include "agail/base/atomic_file.h"
 #include "agail/base/error.h"
+#include "agail/config/settings_file.h"
 #include "agail/reproduce/child_process.h"
 #include "agail/reproduce/demonstrations.h"
 #include "agail/reproduce/record.h"
+#include "agail/train/task_request.h"
 
 namespace agail {
 
@@ -20,7 +22,7 @@ namespace fs = std::filesystem;
 void claim(const fs::path& folder, const char* name, const std::string& description) {
   create_output_folder(folder);
   const fs::path file = folder / name;
-  if (!fs::exists(file)) write_file_atomically(file, description);
+  if (!is_there(file)) create_file_atomically(file, description);
   const std::vector<std::uint8_t> bytes = read_file(file);
   if (std::string(bytes.begin(), bytes.end()) != description)
     throw InputError(file.string() +
@@ -182,11 +184,22 @@ std::vector<GridRun> runs_of(const Experiment& experiment, const GridFilter& fil
   return own;
 }
 
+// What no run could use or would notice is told before the folder belongs to this experiment.
+void check(const Experiment& experiment, const GridFilter& filter) {
+  for (const std::string& text : experiment.assignments)
+    if (parse_assignment(text).setting->name == "run.evaluate_every")
+      throw InputError("--set " + text + ": every run is evaluated about " +
+                       std::to_string(kEvaluationsOfARun) + " times; leave this setting out");
+  for (const Cell& cell : table_cells(filter))
+    check_settings(experiment.settings(cell.environment), cell.environment, cell.method);
+}
+
 }  // namespace
 
 Grid prepare_grid(const Experiment& experiment, const GridFilter& filter, Shard shard,
                   const fs::path& out, const fs::path& experts) {
   const std::vector<GridRun> runs = runs_of(experiment, filter, shard);
+  check(experiment, filter);
   claim(out, "experiment.json", experiment.description());
   for (const char* name : {"records/demonstrations", "runs", "demonstrations", "logs", "locks"})
     create_output_folder(out / name);
