@@ -96,6 +96,7 @@ TEST(Safetensors, RefusesWhatTheFormatForbids) {
   EXPECT_THAT(refused({}), HasSubstr("shorter than 8 bytes"));
   EXPECT_THAT(refused(Bytes(8, 255)), HasSubstr("cut short"));
   EXPECT_THAT(header(""), HasSubstr("not JSON"));
+  EXPECT_THAT(header(R"({"a":1e999})"), HasSubstr("not JSON"));
   EXPECT_THAT(header("[]"), HasSubstr("not a JSON object"));
   EXPECT_THAT(header("{\"a\xff\":1}"), HasSubstr("not JSON"));
   EXPECT_THAT(header(std::string(100000, '[')), HasSubstr("nested too deeply"));

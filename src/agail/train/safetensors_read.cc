@@ -56,6 +56,8 @@ class Reader {
       header = json::parse(text.begin(), text.end(), refuse_duplicates());
     } catch (const json::parse_error& error) {
       fail("the header is not JSON (byte " + std::to_string(error.byte) + ")");
+    } catch (const json::exception&) {  // a number that is too large
+      fail("the header is not JSON that can be read");
     }
     if (!header.is_object()) fail("the header is not a JSON object");
     return header;
