@@ -36,7 +36,7 @@ struct TrpoSettings {
   std::int64_t cg_iterations = 10;
   double cg_damping = 0.1;
   std::int64_t fisher_stride = 5;
-  std::int64_t line_search_halvings = 10;
+  std::int64_t line_search_halvings = 10;  // candidates, the first is the step itself
   double entropy_weight = 0;
 };
 
@@ -79,7 +79,7 @@ struct RewardSettings {
 struct StartSettings {
   std::string method = "random";
   double log_std = -1;            // of a cloned policy's continuous actions
-  std::int64_t value_warmup = 0;  // batches that fit the value network only
+  std::int64_t value_warmup = 0;  // batches in which the policy does not move
 };
 
 // The cloning term of the policy's objective.

@@ -44,7 +44,7 @@ std::span<const Setting> settings_table() {
     {AGAIL_SETTING(trpo.cg_iterations), at_least(1), "", "conjugate gradient iterations"},
     {AGAIL_SETTING(trpo.cg_damping), at_least(0), "", "added to the diagonal of the Fisher matrix"},
     {AGAIL_SETTING(trpo.fisher_stride), at_least(1), "samples", "the Fisher matrix uses every n-th sample of the batch"},
-    {AGAIL_SETTING(trpo.line_search_halvings), at_least(0), "", "how often a step that is too large is halved before it is given up"},
+    {AGAIL_SETTING(trpo.line_search_halvings), at_least(1), "", "candidates of the line search: the step, then each half the one before"},
     {AGAIL_SETTING(trpo.entropy_weight), at_least(0), "", "weight of the policy's causal entropy in its objective"},
 
     {AGAIL_SETTING(value.hidden), at_least(1), "units", "hidden layers of the value network (tanh)"},
@@ -75,7 +75,7 @@ std::span<const Setting> settings_table() {
 
     {AGAIL_SETTING(start.method), one_of({"random", "clone", "clone-inferred"}), "", "how the policy starts: with random weights, cloned from the available actions, or from available and inferred ones"},
     {AGAIL_SETTING(start.log_std), between(-20, 5), "", "log standard deviation of continuous actions, if the policy starts cloned"},
-    {AGAIL_SETTING(start.value_warmup), at_least(0), "batches", "batches at the start that only the value network learns from"},
+    {AGAIL_SETTING(start.value_warmup), at_least(0), "batches", "batches at the start in which the policy does not move yet; everything else learns"},
 
     {AGAIL_SETTING(clone.weight), at_least(0), "", "weight of the cloning term in the policy's objective at the start"},
     {AGAIL_SETTING(clone.decay), between(0, 1), "an update", "factor of the cloning term's weight"},
