@@ -9,12 +9,12 @@
 
 #include "agail/comm/collectives.h"
 #include "agail/comm/together.h"
-#include "agail/config/resolve.h"
 #include "agail/demos/mask.h"
-#include "agail/train/trainer.h"
+#include "agail/train/task_request.h"
 #include "bench_demos.h"
 #include "bench_stepping.h"
 #include "commands.h"
+#include "option_checks.h"
 #include "peak.h"
 
 namespace agail {
@@ -45,12 +45,13 @@ struct Options {
 };
 
 TrainingTask make_task(const Options& options, const std::string& environment) {
-  TrainingTask task;
-  task.environment = environment;
-  task.method = options.method;
-  task.settings = resolve_settings({options.preset, environment, options.assignments});
-  task.settings_toml = to_toml(task.settings);
-  task.threads = options.threads;
+  TrainingTask task = make_training_task({.environment = environment,
+                                          .method = options.method,
+                                          .preset = options.preset,
+                                          .assignments = options.assignments,
+                                          .threads = options.threads});
+  if (task.method == "bc" && !options.only_stepping)
+    throw InputError("--method bc makes no updates that could be measured; give another method");
   if (options.method == "trpo" || options.only_stepping) return task;
   // What demonstrations show does not matter to what learning from them costs.
   Demonstrations demos = untrained_demonstrations(task, options.demonstrations);
@@ -211,12 +212,12 @@ void add_bench(CLI::App& app, Communicator& communicator) {
   command
       ->add_option("--demonstrations", options->demonstrations,
                    "Transitions of the demonstrations, default those of 100 episodes")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   command->add_flag("--only-stepping", options->only_stepping,
                     "No training: step through uniformly random actions");
   command->add_option("--updates", options->updates, "Updates to measure, default 60")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--threads", options->threads, "Default 1")->check(CLI::Range(1, 4096));
+      ->check(whole_number(1, 1'000'000'000));
+  command->add_option("--threads", options->threads, "Default 1")->check(whole_number(1, 4096));
   command->add_flag("--json", options->json, "Print JSON");
   command->callback([options, &communicator] { run(*options, communicator); });
 }

@@ -10,6 +10,7 @@
 #include "agail/train/table_demonstrations.h"
 #include "commands.h"
 #include "inspect_demos.h"
+#include "option_checks.h"
 
 namespace agail {
 namespace {
@@ -59,7 +60,8 @@ void add_convert(CLI::App& app) {
   command
       ->add_option("--out", options->output,
                    "x.hdf5: one file; any other name: a Minari dataset folder")
-      ->required();
+      ->required()
+      ->check(not_empty());
   command->add_option("--env", options->environment, "The environment's Gymnasium id")->required();
   command->callback([options] { run(*options); });
 }

@@ -6,6 +6,7 @@
 
 #include "agail/train/evaluation.h"
 #include "commands.h"
+#include "option_checks.h"
 
 namespace agail {
 namespace {
@@ -26,7 +27,8 @@ void run(const Options& options) {
   const auto [shortest, longest] =
       std::minmax_element(evaluation.lengths.begin(), evaluation.lengths.end());
   const std::optional<double>& demonstrations = policy.info().demonstrations_mean_return;
-  const auto share = demonstrations && *demonstrations != 0
+  // Where the demonstrations' return is negative, a worse policy would have the larger share.
+  const auto share = demonstrations && *demonstrations > 0
                          ? std::optional(evaluation.mean_return() / *demonstrations)
                          : std::nullopt;
   if (options.json) {
@@ -68,8 +70,8 @@ void add_eval(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   command->add_option("POLICY", options->policy, "A run folder or a .safetensors file")->required();
   command->add_option("--episodes", options->episodes, "Default 50")
-      ->check(CLI::Range(1, 1'000'000));
-  command->add_option("--seed", options->seed, "Names the episodes")->check(CLI::NonNegativeNumber);
+      ->check(whole_number(1, 1'000'000));
+  command->add_option("--seed", options->seed, "Names the episodes")->check(any_seed());
   command->add_flag("--stochastic", options->stochastic,
                     "Sample actions instead of taking the mode");
   command->add_flag("--json", options->json, "Print JSON");

@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "agail/base/atomic_file.h"
 #include "agail/demos/minari_reader.h"
 #include "agail/train/saved_policy.h"
 #include "commands.h"
@@ -62,7 +63,7 @@ void print(const ordered_json& description, int indent = 0) {
 }
 
 void run(const std::string& path, bool json) {
-  const bool is_run = fs::exists(fs::path(path) / "config.toml");
+  const bool is_run = is_there(fs::path(path) / "config.toml");
   const bool is_policy = fs::path(path).extension() == ".safetensors";
   if (!is_run && !is_policy) {
     describe_demonstrations(read_demonstrations(path), json, std::cout);

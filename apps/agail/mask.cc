@@ -8,6 +8,7 @@
 #include "agail/demos/minari_writer.h"
 #include "commands.h"
 #include "inspect_demos.h"
+#include "option_checks.h"
 
 namespace agail {
 namespace {
@@ -50,7 +51,8 @@ void add_mask(CLI::App& app) {
   command
       ->add_option("--out", options->output,
                    "x.hdf5: one file; any other name: a Minari dataset folder")
-      ->required();
+      ->required()
+      ->check(not_empty());
   command
       ->add_option("--pattern", options->pattern,
                    "step: single steps; block: runs of 20 steps; episode: whole episodes; "
@@ -58,13 +60,15 @@ void add_mask(CLI::App& app) {
                    "channels")
       ->capture_default_str();
   CLI::Option* dimension =
-      command->add_option("--dimension", options->dimension,
-                          "With --pattern dimension: the channel to remove first, from 0");
+      command
+          ->add_option("--dimension", options->dimension,
+                       "With --pattern dimension: the channel to remove first, from 0")
+          ->check(whole_number(0, std::numeric_limits<int>::max()));
   command
       ->add_option("--seed", options->seed,
                    "Which entries go; a larger share contains a smaller one")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(any_seed());
   command->callback([options, dimension] { run(*options, dimension->count() > 0); });
 }
 

@@ -8,6 +8,7 @@
 #include "agail/train/evaluation.h"
 #include "commands.h"
 #include "inspect_demos.h"
+#include "option_checks.h"
 
 namespace agail {
 namespace {
@@ -37,12 +38,13 @@ void add_record(CLI::App& app) {
   command->add_option("POLICY", options->policy, "A run folder or a .safetensors file")->required();
   command->add_option("--episodes", options->episodes, "How many")
       ->required()
-      ->check(CLI::Range(1, 1'000'000));
+      ->check(whole_number(1, 1'000'000));
   command
       ->add_option("--out", options->out,
                    "x.hdf5: one file; any other name: a Minari dataset folder")
-      ->required();
-  command->add_option("--seed", options->seed, "Names the episodes")->check(CLI::NonNegativeNumber);
+      ->required()
+      ->check(not_empty());
+  command->add_option("--seed", options->seed, "Names the episodes")->check(any_seed());
   command->add_flag("--stochastic", options->stochastic,
                     "Sample actions instead of taking the mode");
   command->callback([options] { run(*options); });

@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 
+#include "agail/base/atomic_file.h"
 #include "agail/base/cpu_quota.h"
 #include "agail/base/error.h"
 #include "agail/comm/launch.h"
@@ -10,6 +11,7 @@
 #include "agail/reproduce/progress_display.h"
 #include "agail/reproduce/table.h"
 #include "commands.h"
+#include "option_checks.h"
 
 namespace agail {
 namespace {
@@ -51,7 +53,7 @@ void run(Options options) {
     throw InputError("no experiment '" + options.experiment + "'; did you mean 'table1'?");
   const fs::path out = options.out;
   if (options.only_tables) {
-    if (!fs::is_directory(out / "records"))
+    if (!is_there(out / "records"))
       throw InputError(out.string() +
                        ": no records/ in this folder; give one that agail reproduce "
                        "has worked in");
@@ -88,23 +90,24 @@ void add_reproduce(CLI::App& app) {
   command
       ->add_option("--out", options->out,
                    "Folder of the experiment; the same command goes on with what is there")
-      ->required();
+      ->required()
+      ->check(not_empty());
   command->add_option("--preset", options->what.preset, "default, paper, or a .toml file");
   command->add_option("--set", options->what.assignments, "key=value, for all runs but the experts")
       ->allow_extra_args(false);
   command
       ->add_option("--timesteps", options->what.timesteps,
                    "Of every run, the experts' too, in place of the environment's own")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   command->add_option("--envs", options->filter.environments, "Only these environments");
   command->add_option("--methods", options->filter.methods,
                       "Only these of trpo gail state-gail agail");
   command->add_option("--missing", options->filter.missing,
                       "Only these of agail's 0 0.25 0.5 0.75");
   command->add_option("--seeds", options->filter.seeds, "In place of 0 1 2 3 4 5")
-      ->check(CLI::NonNegativeNumber);
+      ->check(any_seed());
   command->add_option("--jobs", options->jobs, "Runs at a time; default: the cores of this machine")
-      ->check(CLI::Range(1, 4096));
+      ->check(whole_number(1, 4096));
   command->add_option("--shard", options->shard,
                       "i/n: part i of n (from 1), for several machines with a common --out");
   command->add_option("--experts", options->experts,

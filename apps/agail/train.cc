@@ -2,12 +2,14 @@
 #include <iostream>
 #include <memory>
 
+#include "agail/base/atomic_file.h"
 #include "agail/comm/together.h"
 #include "agail/config/settings_reference.h"
 #include "agail/demos/minari_reader.h"
 #include "agail/train/run.h"
 #include "agail/train/task_request.h"
 #include "commands.h"
+#include "option_checks.h"
 
 namespace agail {
 namespace {
@@ -21,8 +23,7 @@ struct Options : TaskRequest {
 TaskRequest request_of(const Options& options, bool preset_given) {
   TaskRequest request = options;
   const std::filesystem::path config = std::filesystem::path(options.out) / "config.toml";
-  if (options.resume && !preset_given && options.assignments.empty() &&
-      std::filesystem::exists(config))
+  if (options.resume && !preset_given && options.assignments.empty() && is_there(config))
     request.preset = config.string();
   return request;
 }
@@ -63,7 +64,9 @@ void add_train(CLI::App& app, Communicator& communicator) {
   const auto options = std::make_shared<Options>();
   command->add_option("ENV", options->environment, "Environment id, see agail envs")->required();
   command->add_option("--method", options->method, training_method_names())->required();
-  command->add_option("--out", options->out, "Run folder to create")->required();
+  command->add_option("--out", options->out, "Run folder to create")
+      ->required()
+      ->check(not_empty());
   command->add_option(
       "--demos", options->demos,
       "Demonstrations: a .hdf5 file, a Minari dataset folder or a Minari dataset id");
@@ -74,15 +77,14 @@ void add_train(CLI::App& app, Communicator& communicator) {
   command
       ->add_option("--timesteps", options->timesteps,
                    "Stop after the first update at or past this many steps")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--seed", options->seed, "Names all random numbers")
-      ->check(CLI::NonNegativeNumber);
+      ->check(positive());
+  command->add_option("--seed", options->seed, "Names all random numbers")->check(any_seed());
   command
       ->add_option("--threads", options->threads,
                    "Of each rank; default: the cores of this machine or container")
-      ->check(CLI::Range(1, 4096));
+      ->check(whole_number(1, 4096));
   command->add_option("--lanes", options->lanes, "Environments that collect a batch side by side")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   command->add_flag("--resume", options->resume, "Go on with the run in --out");
   const auto print_and_exit = [command](const std::string& flag, std::string (*text)(),
                                         const std::string& help) {

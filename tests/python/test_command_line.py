@@ -3,6 +3,7 @@
 import json
 import os
 
+import h5py
 import pytest
 from program import SMALL
 
@@ -62,8 +63,24 @@ TRAIN = ["train", "CartPole-v1", "--method", "trpo", "--out", "run"]
         (["inspect", "absent"], "absent"),
         (["mask", "absent.hdf5", "--missing", "0.5", "--out", "x.hdf5"], "absent.hdf5"),
         (["bench", "Hoper-v5"], "Hopper-v5"),
+        (["bench", "CartPole-v1", "--method", "agial"], "'agail'"),
+        (["bench", "CartPole-v1", "--method", "bc"], "--method bc"),
+        (["bench", "CartPole-v1", "--only-stepping", "--set", "run.lanes=2000"], "run.lanes"),
+        ([*TRAIN, "--seed", "010"], "--seed: '010'"),
+        ([*TRAIN, "--seed", "0x10"], "--seed"),
+        ([*TRAIN, "--seed", "99999999999999999999"], "--seed"),
+        ([*TRAIN, "--timesteps", "9223372036854775808"], "--timesteps"),
+        (["eval", "absent", "--episodes", "010"], "--episodes"),
+        ([*TRAIN, "--lanes", "3", "--set", "run.batch_steps=256"], "run.lanes"),
+        ([*TRAIN[:-1], ""], "--out"),
+        ([*TRAIN[:-1], "x" * 300], "File name too long"),
+        ([*TRAIN[:-1], "x" * 300, "--resume"], "File name too long"),
+        (["eval", "x" * 300], "File name too long"),
+        (["record", "x" * 300, "--episodes", "1", "--out", "x.hdf5"], "File name too long"),
+        (["record", "absent", "--episodes", "1", "--out", ""], "--out"),
+        (["inspect", "x" * 300], "File name too long"),
     ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+    ids=lambda value: " ".join(value)[:60] if isinstance(value, list) else "",
 )
 def test_wrong_input(agail, tmp_path, monkeypatch, arguments, told):
     monkeypatch.chdir(tmp_path)
@@ -182,6 +199,27 @@ def test_from_expert_to_imitator(agail, small, tmp_path):
 def test_an_expert_has_no_demonstrations_to_share(agail, small):
     result = agail.json("eval", small / "cartpole-expert", "--episodes", 2)
     assert result["share_of_demonstrations"] is None
+
+
+def test_no_share_of_a_negative_return(agail, small, tmp_path):
+    demos = tmp_path / "costs.hdf5"
+    demos.write_bytes((small / "cartpole.hdf5").read_bytes())
+    with h5py.File(demos, "r+") as file:
+        for name in file:
+            file[name]["rewards"][...] *= -1
+    agail(
+        "train",
+        "CartPole-v1",
+        "--method",
+        "bc",
+        "--demos",
+        demos,
+        "--out",
+        tmp_path / "run",
+        *SMALL,
+    )
+    assert agail.json("eval", tmp_path / "run")["share_of_demonstrations"] is None
+    assert "share" not in agail("eval", tmp_path / "run")
 
 
 def test_inspect_tells_policies_and_runs_apart(agail, small):

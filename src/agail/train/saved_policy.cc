@@ -240,12 +240,12 @@ void SavedPolicy::act(std::span<const double> observation, RandomStream* random,
 
 std::filesystem::path policy_file(const std::filesystem::path& policy) {
   namespace fs = std::filesystem;
-  if (!fs::exists(policy))
+  if (!is_there(policy))
     throw InputError(policy.string() +
                      ": no such file or folder; give a run folder or a .safetensors file");
   if (!fs::is_directory(policy)) return policy;
   for (const char* name : {"policy_best.safetensors", "policy.safetensors"})
-    if (fs::exists(policy / name)) return policy / name;
+    if (is_there(policy / name)) return policy / name;
   throw InputError(policy.string() +
                    ": no policy in this folder; give the folder of a run that has saved one, or a "
                    ".safetensors file");
