@@ -346,7 +346,7 @@ def test_two_processes_in_one_folder(agail, small, tmp_path):
     try:
         wait_for_rows(process, run, 3)
         for more in ([], ["--resume"], ["--resume", "--seed", 1]):
-            told = agail.refused(*train(small, "trpo", run, 10**8, *more))
+            told = agail.refused(*train(small, "trpo", run, 1024, *more))
             assert "another agail is training in this folder" in told
     finally:
         process.terminate()
