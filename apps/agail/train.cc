@@ -49,11 +49,12 @@ void run(const Options& options, bool preset_given, Communicator& communicator) 
       std::cerr << "agail: stopped at " << outcome.timesteps << " steps; go on with --resume\n";
     throw Interrupted{outcome.signal};
   }
-  const std::optional<Evaluation>& shown = outcome.best ? outcome.best : outcome.last;
+  const auto& [best, last] = outcome.evaluations;
+  const std::optional<Evaluation>& shown = best ? best : last;
   std::cout << options.out;
   if (shown)
     std::cout << ": mean return " << shown->mean_return() << " over " << shown->returns.size()
-              << " deterministic episodes" << (outcome.best ? " (best checkpoint)" : "");
+              << " deterministic episodes" << (best ? " (best checkpoint)" : "");
   std::cout << "\n";
 }
 

@@ -1,9 +1,9 @@
 #include "agail/train/checkpoint.h"
 
+#include <gtest/gtest.h>
+
 #include "agail/base/atomic_file.h"
-#include "agail/train/safetensors.h"
 #include "agail/train/task_request.h"
-#include "base/messages.h"
 #include "base/temporary_folder.h"
 
 namespace agail {
@@ -27,10 +27,9 @@ class Checkpoint : public testing::Test {
 };
 
 TEST_F(Checkpoint, KeepsTheEvaluations) {
-  RunEvaluations saved{3, Evaluation{{2, 4}, {20, 40}, 1}, Evaluation{{1}, {10}, 0}}, loaded;
+  RunEvaluations saved{Evaluation{{2, 4}, {20, 40}, 1}, Evaluation{{1}, {10}, 0}}, loaded;
   checkpoint_.save(trainer_, saved);
   ASSERT_TRUE(checkpoint_.load(trainer_, loaded));
-  EXPECT_EQ(loaded.best_return, 3);
   ASSERT_TRUE(loaded.best && loaded.last);
   EXPECT_EQ(loaded.best->returns, (std::vector<double>{2, 4}));
   EXPECT_EQ(loaded.best->lengths, (std::vector<double>{20, 40}));
@@ -41,28 +40,6 @@ TEST_F(Checkpoint, KeepsTheEvaluations) {
   checkpoint_.save(trainer_, none);
   ASSERT_TRUE(checkpoint_.load(trainer_, loaded));
   EXPECT_FALSE(loaded.best || loaded.last);
-}
-
-// A run that a build with format 1 began goes on.
-TEST_F(Checkpoint, TheOlderFormatHasTheBestReturnOnly) {
-  RunEvaluations saved{3, Evaluation{{3}, {3}, 0}, Evaluation{{1}, {1}, 0}}, loaded;
-  checkpoint_.save(trainer_, saved);
-  TensorStore store = from_safetensors(read_file(file_), "c", Checksum::kRequired);
-  store.metadata["format"] = "agail-checkpoint-1";
-  EXPECT_EQ(std::erase_if(store.tensors,
-                          [](const auto& entry) {
-                            return entry.first.find("_evaluation.") != std::string::npos;
-                          }),
-            6U);
-  write_file_atomically(file_, to_safetensors(store));
-  ASSERT_TRUE(checkpoint_.load(trainer_, loaded));
-  EXPECT_EQ(loaded.best_return, 3);
-  EXPECT_FALSE(loaded.best || loaded.last);
-
-  store.metadata["format"] = "agail-checkpoint-0";
-  write_file_atomically(file_, to_safetensors(store));
-  EXPECT_THAT(input_error([&] { checkpoint_.load(trainer_, loaded); }),
-              testing::HasSubstr("other format"));
 }
 
 }  // namespace

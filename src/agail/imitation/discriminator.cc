@@ -27,11 +27,7 @@ std::vector<Index> all_or(const Sizes& features, int observation_dim) {
     result.resize(static_cast<std::size_t>(observation_dim));
     std::iota(result.begin(), result.end(), Index{0});
   }
-  for (const Index feature : result)
-    if (feature < 0 || feature >= observation_dim)
-      throw InputError("setting discriminator.features: index " + std::to_string(feature) +
-                       " is outside the observation; give indices from 0 to " +
-                       std::to_string(observation_dim - 1));
+  for (const Index feature : result) AGAIL_CHECK(feature >= 0 && feature < observation_dim);
   return result;
 }
 

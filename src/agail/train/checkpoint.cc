@@ -15,8 +15,6 @@ namespace agail {
 namespace {
 
 constexpr const char* kFormat = "agail-checkpoint-2";
-// Has of the evaluations the best return only; runs that it is of can go on.
-constexpr const char* kOlderFormat = "agail-checkpoint-1";
 
 std::map<std::string, std::string> identity(const Trainer& trainer) {
   const TrainingTask& task = trainer.task();
@@ -45,12 +43,9 @@ void walk(Archive& archive, const char* name, std::optional<Evaluation>& evaluat
   evaluation = value.returns.empty() ? std::nullopt : std::optional(std::move(value));
 }
 
-void walk(Archive& archive, Trainer& trainer, RunEvaluations& evaluations, bool older) {
-  archive("best_return", evaluations.best_return);
-  if (!older) {
-    walk(archive, "best_evaluation", evaluations.best);
-    walk(archive, "last_evaluation", evaluations.last);
-  }
+void walk(Archive& archive, Trainer& trainer, RunEvaluations& evaluations) {
+  walk(archive, "best_evaluation", evaluations.best);
+  walk(archive, "last_evaluation", evaluations.last);
   archive.scope("trainer", [&](Archive& inner) { trainer.archive(inner); });
 }
 
@@ -69,7 +64,7 @@ void CheckpointFile::save(Trainer& trainer, RunEvaluations& evaluations) const {
   TensorStore store;
   store.metadata = identity_;
   Archive archive(store, Archive::Mode::kSave);
-  walk(archive, trainer, evaluations, false);
+  walk(archive, trainer, evaluations);
   Communicator& communicator = trainer.team().communicator();
   const std::vector<std::uint8_t> bytes = to_safetensors(store);
   // The safety net of a state that is held by all: a machine that computes otherwise ends the job
@@ -104,8 +99,6 @@ bool CheckpointFile::load(Trainer& trainer, RunEvaluations& evaluations) const {
 void CheckpointFile::restore(const std::vector<std::uint8_t>& bytes, Trainer& trainer,
                              RunEvaluations& evaluations) const {
   TensorStore store = from_safetensors(bytes, file_.string(), Checksum::kRequired);
-  const bool older = store.metadata["format"] == kOlderFormat;
-  if (older) store.metadata["format"] = kFormat;
   for (const auto& [key, value] : identity_) {
     const auto found = store.metadata.find(key);
     if (found == store.metadata.end() || found->second != value)
@@ -114,7 +107,7 @@ void CheckpointFile::restore(const std::vector<std::uint8_t>& bytes, Trainer& tr
           "; resume with what the run was started with, or start a new run in another folder");
   }
   Archive archive(store, Archive::Mode::kLoad);
-  walk(archive, trainer, evaluations, older);
+  walk(archive, trainer, evaluations);
 }
 
 }  // namespace agail

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -13,10 +12,9 @@
 
 namespace agail {
 
-// What a run knows of its evaluations.
 struct RunEvaluations {
-  double best_return = -std::numeric_limits<double>::max();
-  std::optional<Evaluation> best, last;
+  std::optional<Evaluation> best;  // trpo: of policy_best
+  std::optional<Evaluation> last;
 };
 
 class CheckpointFile {

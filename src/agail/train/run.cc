@@ -70,8 +70,8 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
                      {"mean_length", evaluation->mean_length()}};
   };
   add("cloned_evaluation", outcome.cloned);
-  add("best_evaluation", outcome.best);
-  add("last_evaluation", outcome.last);
+  add("best_evaluation", outcome.evaluations.best);
+  add("last_evaluation", outcome.evaluations.last);
   const auto regression = [&](const char* name, const std::optional<RegressionReport>& report) {
     if (report)
       summary[name] = {{"epochs", report->epochs},
@@ -173,7 +173,6 @@ class Run {
   std::optional<CheckpointFile> checkpoint_;
   std::optional<RunLog> log_;  // of the first rank
   RunOutcome outcome_;
-  RunEvaluations evaluations_;
   std::int64_t saved_timesteps_ = -1;
 };
 
@@ -201,8 +200,8 @@ bool Run::prepare() {
                                  trainer_->task().seed, false, trainer_->team());
     });
   // From here on a resume with another task is refused: the start is a checkpoint, too.
-  if (!options_.resume || !checkpoint_->load(*trainer_, evaluations_))
-    or_abort(communicator_, [&] { checkpoint_->save(*trainer_, evaluations_); });
+  if (!options_.resume || !checkpoint_->load(*trainer_, outcome_.evaluations))
+    or_abort(communicator_, [&] { checkpoint_->save(*trainer_, outcome_.evaluations); });
   saved_timesteps_ = trainer_->timesteps();
   together(communicator_, [&] {
     if (!first_) return;
@@ -217,12 +216,12 @@ bool Run::prepare() {
 
 std::optional<Evaluation> Run::evaluate_now() {
   const SavedPolicy policy = trainer_->policy();
-  const std::optional<Evaluation>& last = evaluations_.last = evaluate(
-      policy, settings_.evaluation_episodes, trainer_->task().seed, false, trainer_->team());
+  auto& [best, last] = outcome_.evaluations;
+  last = evaluate(policy, settings_.evaluation_episodes, trainer_->task().seed, false,
+                  trainer_->team());
   // An imitator has no true reward to select by.
-  if (trainer_->task().method == "trpo" && last->mean_return() > evaluations_.best_return) {
-    evaluations_.best_return = last->mean_return();
-    evaluations_.best = last;
+  if (trainer_->task().method == "trpo" && (!best || last->mean_return() > best->mean_return())) {
+    best = last;
     if (first_) policy.save(folder_ / "policy_best.safetensors");
   }
   return last;
@@ -230,7 +229,7 @@ std::optional<Evaluation> Run::evaluate_now() {
 
 void Run::save() {
   if (first_) log_->flush();  // what the checkpoint has seen is in the log
-  checkpoint_->save(*trainer_, evaluations_);
+  checkpoint_->save(*trainer_, outcome_.evaluations);
   saved_timesteps_ = trainer_->timesteps();
 }
 
@@ -255,8 +254,6 @@ void Run::train() {
 
   must_stop();
   outcome_.timesteps = trainer.timesteps();
-  outcome_.best = evaluations_.best;
-  outcome_.last = evaluations_.last;
   const Traffic traffic = total_of(communicator_, communicator_.traffic());
   if (!first_) return;
   log_->finish();

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include "agail/train/checkpoint.h"
 #include "agail/train/evaluation.h"
 #include "agail/train/trainer.h"
 
@@ -18,8 +19,7 @@ struct RunOutcome {
   std::int64_t timesteps = 0;
   double start_seconds = 0;          // until there was a policy: cloning, where it starts cloned
   std::optional<Evaluation> cloned;  // of the start, where the policy starts cloned
-  std::optional<Evaluation> best;    // trpo: of policy_best
-  std::optional<Evaluation> last;    // the last evaluation
+  RunEvaluations evaluations;
 };
 
 struct RunOptions {

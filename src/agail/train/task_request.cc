@@ -25,23 +25,6 @@ const std::string& training_method_names() {
   return names;
 }
 
-// A Trainer checks the same, but only once it has demonstrations.
-void check_settings(const Settings& settings, const std::string& environment,
-                    const std::string& method) {
-  const RunSettings& run = settings.run;
-  if (run.batch_steps % run.lanes != 0)
-    throw InputError("settings run.batch_steps = " + std::to_string(run.batch_steps) +
-                     " and run.lanes = " + std::to_string(run.lanes) +
-                     " do not fit: every lane takes batch_steps / lanes steps; choose a multiple");
-  if (method == "trpo" || method == "bc" || method == "bco") return;
-  const int observations = environment_spec(environment).observation_dim;
-  for (const std::int64_t feature : settings.discriminator.features)
-    if (feature >= observations)
-      throw InputError("setting discriminator.features: index " + std::to_string(feature) +
-                       " is outside the observation of " + environment +
-                       "; give indices from 0 to " + std::to_string(observations - 1));
-}
-
 TrainingTask make_training_task(const TaskRequest& request) {
   const std::vector<std::string>& methods = training_methods();
   if (std::find(methods.begin(), methods.end(), request.method) == methods.end())

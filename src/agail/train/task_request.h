@@ -24,10 +24,6 @@ struct TaskRequest {
   int threads = 0;  // 0: this rank's share of the machine's or container's cores
 };
 
-// InputError for settings that fit together or to the environment in no run of this method.
-void check_settings(const Settings& settings, const std::string& environment,
-                    const std::string& method);
-
 // The task without demonstrations. InputError for an unknown environment, method or setting, and
 // for what check_settings() finds.
 TrainingTask make_training_task(const TaskRequest& request);

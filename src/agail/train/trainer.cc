@@ -15,14 +15,6 @@ constexpr std::size_t kRecentEpisodes = 100;
 // inferred actions are so poor that the adversarial part starts from next to nothing.
 constexpr std::int64_t kExploringRounds = 6, kExploringEpochs = 60;
 
-Index steps_a_lane(const RunSettings& run) {
-  if (run.batch_steps % run.lanes != 0)
-    throw InputError("settings run.batch_steps = " + std::to_string(run.batch_steps) +
-                     " and run.lanes = " + std::to_string(run.lanes) +
-                     " do not fit: every lane takes batch_steps / lanes steps; choose a multiple");
-  return run.batch_steps / run.lanes;
-}
-
 std::string dimensions(int observations, const ActionSpace& action) {
   return std::to_string(observations) + " observations and " +
          (action.discrete ? std::to_string(action.n) + " discrete actions"
@@ -30,6 +22,22 @@ std::string dimensions(int observations, const ActionSpace& action) {
 }
 
 }  // namespace
+
+void check_settings(const Settings& settings, const std::string& environment,
+                    const std::string& method) {
+  const RunSettings& run = settings.run;
+  if (run.batch_steps % run.lanes != 0)
+    throw InputError("settings run.batch_steps = " + std::to_string(run.batch_steps) +
+                     " and run.lanes = " + std::to_string(run.lanes) +
+                     " do not fit: every lane takes batch_steps / lanes steps; choose a multiple");
+  if (method == "trpo" || method == "bc" || method == "bco") return;
+  const int observations = environment_spec(environment).observation_dim;
+  for (const std::int64_t feature : settings.discriminator.features)
+    if (feature >= observations)
+      throw InputError("setting discriminator.features: index " + std::to_string(feature) +
+                       " is outside the observation of " + environment +
+                       "; give indices from 0 to " + std::to_string(observations - 1));
+}
 
 Trainer::Trainer(TrainingTask task, Communicator& communicator)
     : task_(std::move(task)),
@@ -42,7 +50,7 @@ Trainer::Trainer(TrainingTask task, Communicator& communicator)
                   task_.settings.policy.observation_clip),
       collector_(task_.environment, task_.settings.run.lanes, task_.seed, team_),
       batch_(spec_.observation_dim, spec_.action.dim, task_.settings.run.lanes,
-             steps_a_lane(task_.settings.run)),
+             task_.settings.run.batch_steps / task_.settings.run.lanes),
       value_(spec_.observation_dim, task_.settings.value, team_, batch_.size(), task_.seed),
       advantage_(spec_.observation_dim, batch_.size()),
       trpo_(network_, team_, task_.settings.trpo, batch_.size()),
@@ -56,6 +64,7 @@ Trainer::Trainer(TrainingTask task, Communicator& communicator)
 }
 
 void Trainer::check() {
+  check_settings(task_.settings, task_.environment, task_.method);
   if (task_.method == "trpo") {
     task_.demonstrations.reset();
     return;

@@ -47,6 +47,11 @@ struct UpdateReport {
   std::optional<BcoReport> bco;  // at the end of a round
 };
 
+// InputError for settings that do not fit together, or not to the environment, in any run of this
+// method.
+void check_settings(const Settings& settings, const std::string& environment,
+                    const std::string& method);
+
 class Trainer {
  public:
   // Checks that task and demonstrations fit together (InputError) and builds everything; a cloned
