@@ -142,6 +142,23 @@ TEST_P(TrainerTest, ContinuesFromAnArchive) {
   }
 }
 
+TEST(CheckSettings, LanesAndFeaturesMustFit) {
+  Settings settings;
+  settings.run.batch_steps = 512;
+  settings.run.lanes = 4;
+  settings.discriminator.features = {0, 3};
+  check_settings(settings, "CartPole-v1", "agail");
+  settings.discriminator.features = {4};
+  EXPECT_THROW(check_settings(settings, "CartPole-v1", "agail"), InputError);
+  check_settings(settings, "CartPole-v1", "trpo");
+  settings.run.lanes = 3;
+  EXPECT_THROW(check_settings(settings, "CartPole-v1", "trpo"), InputError);
+  TrainingTask lanes = task("CartPole-v1", "trpo");
+  lanes.settings.run.lanes = 3;
+  lanes.settings.run.batch_steps = 512;
+  EXPECT_THROW(Trainer{std::move(lanes)}, InputError);
+}
+
 TEST(ExploringStart, OwnTransitionsTellADimensionThatNoDemonstrationTells) {
   TrainingTask t = task("Hopper-v5", "agail");
   t.settings.start.method = "clone-inferred";
