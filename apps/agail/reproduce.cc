@@ -53,7 +53,7 @@ void run(Options options) {
     throw InputError("no experiment '" + options.experiment + "'; did you mean 'table1'?");
   const fs::path out = options.out;
   if (options.only_tables) {
-    if (!is_there(out / "records"))
+    if (!is_there(out / "records") || !fs::is_directory(out / "records"))
       throw InputError(out.string() +
                        ": no records/ in this folder; give one that agail reproduce "
                        "has worked in");

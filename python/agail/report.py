@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from agail._core import InputError
 from agail._extension import Parser, missing, run
-from agail.statistics import bootstrap_interval, iqm
+from agail.statistics import bootstrap_interval, iqm, share_of
 from agail.training import Run
 
 if TYPE_CHECKING:
@@ -273,10 +273,9 @@ def results_table(groups: list[Group]) -> str:
             continue
         low, high = bootstrap_interval(returns[:, None], iqm, RESAMPLES)
         interval = f"{low[0]:,.1f} to {high[0]:,.1f}" if len(returns) > 1 else "-"
-        reference = group.reference()
-        known = reference is not None and reference > 0  # a share of less than nothing says nothing
-        share = f"{100 * returns.mean() / reference:.1f} %" if known else "-"
-        rows.append([*row, f"{iqm(returns):,.1f}", interval, f"{returns.min():,.1f}", share])
+        share = share_of(returns.mean(), group.reference())
+        shown = "-" if share is None else f"{100 * share:.1f} %"
+        rows.append([*row, f"{iqm(returns):,.1f}", interval, f"{returns.min():,.1f}", shown])
     head = [
         "runs",
         "finished",

@@ -8,6 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+def share_of(value: float, reference: float | None) -> float | None:
+    """None where the reference is not known or not above 0: a share of less than nothing says nothing."""
+    return value / reference if reference is not None and reference > 0 else None
+
+
 def iqm(values: NDArray[np.float64], axis: int = 0) -> NDArray[np.float64]:
     """Mean without the lowest and the highest quarter of n values, int(n / 4) each."""
     ordered = np.sort(np.asarray(values, np.float64), axis)

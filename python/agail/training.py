@@ -21,6 +21,7 @@ from agail._core import InputError, Policy
 from agail._recording import Predictor
 from agail._source import EnvironmentLike, Registered, Source, source_of
 from agail.demonstrations import Demonstrations
+from agail.statistics import share_of
 
 Callback = Callable[[dict[str, float]], bool | None]
 
@@ -240,8 +241,7 @@ def evaluate(
     """
     policy = _policy(policy)
     result = _play(_core.evaluate, policy, episodes, environment, seed, deterministic, threads)
-    reference = policy.demonstrations_mean_return
-    share = result["mean_return"] / reference if reference and reference > 0 else None
+    share = share_of(result["mean_return"], policy.demonstrations_mean_return)
     return Evaluation(share_of_demonstrations=share, **result)
 
 

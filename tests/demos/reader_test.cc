@@ -74,6 +74,10 @@ struct Plain {
   }
 };
 
+std::function<void(Group&)> with_attribute(const std::string& name, const std::string& text) {
+  return [=](Group& group) { group.write_attribute(name, text); };
+}
+
 TEST(Reader, ReadsThePlainestFile) {
   const Demonstrations demonstrations = Plain{}.read();
   EXPECT_EQ(demonstrations.transitions(), 3);
@@ -114,10 +118,8 @@ TEST(Reader, WithoutActionsAllAreMissing) {
   plain.write_actions = false;
   EXPECT_EQ(plain.read().missing_ratio(), 1);
   EXPECT_EQ(plain.read().action.dim, 0);
-  plain.root = [](Group& root) {
-    root.write_attribute("action_space",
-                         R"({"type": "Box", "shape": [2], "low": [-Infinity, -1], "high": 1.0})");
-  };
+  plain.root = with_attribute(
+      "action_space", R"({"type": "Box", "shape": [2], "low": [-Infinity, -1], "high": 1.0})");
   EXPECT_EQ(plain.read().action.dim, 2);
   EXPECT_EQ(plain.read().missing_ratio(), 1);
   // Some episodes with, some without.
@@ -150,9 +152,7 @@ TEST(Reader, IntegersInOneColumnAreDiscrete) {
   plain.mask = {1, 0, 1, 0};  // a 2 that stands in for a missing action
   EXPECT_EQ(plain.read().action.n, 2);
   plain.mask.clear();
-  plain.root = [](Group& root) {
-    root.write_attribute("action_space", R"({"type": "Discrete", "n": 2, "start": 0})");
-  };
+  plain.root = with_attribute("action_space", R"({"type": "Discrete", "n": 2, "start": 0})");
   EXPECT_THAT(plain.error(), AllOf(HasSubstr("episode_0/actions"), HasSubstr("from 0 to 1")));
 }
 
@@ -160,9 +160,7 @@ TEST(Reader, DiscreteObservationsBecomeOneHot) {
   Plain plain;
   plain.observation_shape = {4};
   plain.observations = {1, 3, 2, 1};
-  plain.root = [](Group& root) {
-    root.write_attribute("observation_space", R"({"type": "Discrete", "n": 3, "start": 1})");
-  };
+  plain.root = with_attribute("observation_space", R"({"type": "Discrete", "n": 3, "start": 1})");
   RowMatrix<double> expected(4, 3);
   expected << 1, 0, 0, 0, 0, 1, 0, 1, 0, 1, 0, 0;
   const Demonstrations once = plain.read();
@@ -178,9 +176,7 @@ TEST(Reader, DiscreteObservationsBecomeOneHot) {
 
 TEST(Reader, AnObservationSpaceThatIsNoJsonIsReplaced) {
   Plain plain;
-  plain.root = [](Group& root) {
-    root.write_attribute("observation_space", std::string("Box(-inf, inf, (2,), float64)"));
-  };
+  plain.root = with_attribute("observation_space", "Box(-inf, inf, (2,), float64)");
   EXPECT_THAT(read_demonstrations(encode_demonstrations(plain.read()), "again").metadata,
               HasSubstr(R"(\"type\": \"Box\")"));
 }
@@ -234,20 +230,15 @@ TEST(Reader, RefusesWhatDoesNotFit) {
                 p.root = [](Group& r) { r.write_attribute("total_episodes", std::int64_t{3}); };
               }),
               HasSubstr("3 episodes"));
-  EXPECT_THAT(broken([](Plain& p) {
-                p.root = [](Group& r) { r.write_attribute("env_spec", std::string("{")); };
-              }),
+  EXPECT_THAT(broken([](Plain& p) { p.root = with_attribute("env_spec", "{"); }),
               HasSubstr("env_spec"));
   EXPECT_THAT(broken([](Plain& p) {
-                p.root = [](Group& r) {
-                  r.write_attribute("action_space", R"({"type": "Dict", "subspaces": {}})");
-                };
+                p.root = with_attribute("action_space", R"({"type": "Dict", "subspaces": {}})");
               }),
               HasSubstr("only Box and Discrete"));
   EXPECT_THAT(broken([](Plain& p) {
-                p.root = [](Group& r) {
-                  r.write_attribute("observation_space", R"({"type": "Discrete", "n": 9999999})");
-                };
+                p.root =
+                    with_attribute("observation_space", R"({"type": "Discrete", "n": 9999999})");
               }),
               HasSubstr("n from 1 to 65536"));
   EXPECT_THAT(broken([](Plain& p) {
@@ -258,9 +249,7 @@ TEST(Reader, RefusesWhatDoesNotFit) {
               }),
               HasSubstr("episode_0/infos is a link or no group"));
   EXPECT_THAT(broken([](Plain& p) {
-                p.root = [](Group& r) {
-                  r.write_attribute("action_space", R"({"type": "Discrete", "n": 2})");
-                };
+                p.root = with_attribute("action_space", R"({"type": "Discrete", "n": 2})");
               }),
               HasSubstr("the action space of the file 1"));
   EXPECT_THAT(broken([](Plain& p) {

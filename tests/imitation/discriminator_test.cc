@@ -205,6 +205,8 @@ TEST(Discriminator, SeesOnlyItsFeatures) {
   };
   EXPECT_TRUE(same_store(learned(0, 0), learned(17, 0)));
   EXPECT_FALSE(same_store(learned(0, 0), learned(0, 0.5F)));
+  settings.features = {4};
+  EXPECT_THROW(learned(0, 0), InputError);
 }
 
 }  // namespace

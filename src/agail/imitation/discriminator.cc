@@ -22,16 +22,24 @@ S sigmoid(S d) {
 }
 
 std::vector<Index> all_or(const Sizes& features, int observation_dim) {
+  check_features(features, observation_dim);
   std::vector<Index> result(features.begin(), features.end());
   if (result.empty()) {
     result.resize(static_cast<std::size_t>(observation_dim));
     std::iota(result.begin(), result.end(), Index{0});
   }
-  for (const Index feature : result) AGAIL_CHECK(feature >= 0 && feature < observation_dim);
   return result;
 }
 
 }  // namespace
+
+void check_features(const Sizes& features, int observation_dim) {
+  for (const std::int64_t feature : features)
+    if (feature < 0 || feature >= observation_dim)
+      throw InputError("setting discriminator.features: index " + std::to_string(feature) +
+                       " is outside the observation; give indices from 0 to " +
+                       std::to_string(observation_dim - 1));
+}
 
 template <class S>
 DiscriminatorLoss<S>::DiscriminatorLoss(const Mlp<S>& mlp, const DiscriminatorSettings& settings,

@@ -52,6 +52,9 @@ class DiscriminatorLoss {
 extern template class DiscriminatorLoss<float>;
 extern template class DiscriminatorLoss<double>;
 
+// InputError if a feature is not in the observation; a Discriminator checks it, too.
+void check_features(const Sizes& features, int observation_dim);
+
 class Discriminator {
  public:
   // Sees settings.features of the state (all if empty) and, if `with_actions`, the encoded action.

@@ -31,12 +31,7 @@ void check_settings(const Settings& settings, const std::string& environment,
                      " and run.lanes = " + std::to_string(run.lanes) +
                      " do not fit: every lane takes batch_steps / lanes steps; choose a multiple");
   if (method == "trpo" || method == "bc" || method == "bco") return;
-  const int observations = environment_spec(environment).observation_dim;
-  for (const std::int64_t feature : settings.discriminator.features)
-    if (feature >= observations)
-      throw InputError("setting discriminator.features: index " + std::to_string(feature) +
-                       " is outside the observation of " + environment +
-                       "; give indices from 0 to " + std::to_string(observations - 1));
+  check_features(settings.discriminator.features, environment_spec(environment).observation_dim);
 }
 
 Trainer::Trainer(TrainingTask task, Communicator& communicator)
