@@ -3,7 +3,8 @@
 
     benchmarks/table1_figures.py DIR                        writes DIR/figure2.svg, .png and DIR/figure3.svg, .png
     benchmarks/table1_figures.py DIR --methods docs/figures  the curves of each method besides, for its page: curve-METHOD.svg
-    benchmarks/table1_figures.py DIR --tables FILE.md ...    and the table between the marks <!-- table1 --> of each file
+    benchmarks/table1_figures.py DIR --tables FILE.md ...    and the table between <!-- table1 NAME --> (the last part of DIR)
+                                                            and <!-- end --> in each file
 
 Figure 2: smoothed return of the training episodes against environment steps, mean over the seeds and its standard error;
 left ours, right the paper's. Figure 3: the return at the end of that against the share of missing actions, TRPO and
@@ -131,7 +132,7 @@ def method_figure(ours: dict, environments: list[str], labels: list[str]) -> plt
 
 def figure3(table: list[dict], environments: list[str]) -> plt.Figure:
     figure, axes = plt.subplots(
-        1, len(environments), figsize=(3.2 * len(environments), 3), layout="constrained",
+        1, len(environments), figsize=(3.2 * len(environments), 3.2), layout="constrained",
         squeeze=False,
     )  # fmt: skip
     for axis, environment in zip(axes[0], environments, strict=True):
@@ -155,7 +156,9 @@ def figure3(table: list[dict], environments: list[str]) -> plt.Figure:
         axis.set_title(environment, fontsize=9)
         axis.set_xlabel("missing actions, %")
     axes[0][0].set_ylabel("return (the paper's statistic)")
-    axes[0][-1].legend(fontsize=6)
+    figure.legend(
+        *axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=7
+    )
     return figure
 
 
@@ -215,7 +218,7 @@ def main() -> None:
             method_figure(ours, environments, labels).savefig(file, metadata={"Date": None})
             print(file)
     for file in options.tables:
-        fill(file, "table1", markdown_table(table, ours, environments))
+        fill(file, f"table1 {folder.name}", markdown_table(table, ours, environments))
         print(file)
 
 
