@@ -218,7 +218,7 @@ def main() -> None:
             method_figure(ours, environments, labels).savefig(file, metadata={"Date": None})
             print(file)
     for file in options.tables:
-        fill(file, f"table1 {folder.name}", markdown_table(table, ours, environments))
+        fill(file, f"table1 {folder.resolve().name}", markdown_table(table, ours, environments))
         print(file)
 
 
