@@ -2,7 +2,7 @@
 """Trains and evaluates what docs/results.md reports, and writes results/<experiment>.csv.
 
     benchmarks/measure.py imitation    agail and what it is compared with, 10 demonstrations, 75 % of the actions missing, seeds 0-4
-    benchmarks/measure.py ablation     agail with one part off at a time, 10 and 3 demonstrations, seeds 0-4
+    benchmarks/measure.py ablation     agail with one part off at a time, less exploration, or more interactions, 10 and 3 demonstrations, seeds 0-4
 
 Runs go to --work (default runs/measure), --jobs at a time with one thread each; finished runs are kept, interrupted
 ones resumed, so the command can be repeated until it is through. Results do not depend on --jobs.
@@ -27,12 +27,14 @@ EPISODES = 50
 MISSING = 0.75
 EXPERT_SEEDS = (10, 11, 12)
 STEPS = {"Hopper-v5": 40_000, "Walker2d-v5": 80_000}
-OFF = {
-    "full": [],
-    "no discriminator": ["reward.alpha=0"],
-    "no guide": ["reward.beta=0"],
-    "no warm start": ["start.method=random"],
-    "no cloning term": ["clone.weight=0"],
+VARIANTS = {  # of agail: settings, and how many times STEPS
+    "full": ([], 1),
+    "no discriminator": (["reward.alpha=0"], 1),
+    "no guide": (["reward.beta=0"], 1),
+    "no warm start": (["start.method=random"], 1),
+    "no cloning term": (["clone.weight=0"], 1),
+    "less exploration": (["start.log_std=-3"], 1),
+    "more interactions": ([], 2.5),
 }
 
 
@@ -128,9 +130,15 @@ def demonstrations(work: Path, environment: str, trajectories: int) -> Path:
 
 
 def imitate(
-    run: Path, environment: str, method: str, seed: int, demos: Path, assignments: list[str]
+    run: Path,
+    environment: str,
+    method: str,
+    seed: int,
+    demos: Path,
+    assignments: list[str],
+    timesteps: int,
 ) -> dict:
-    options = ["--demos", demos, "--timesteps", STEPS[environment], "--set", "run.evaluate_every=5"]
+    options = ["--demos", demos, "--timesteps", timesteps, "--set", "run.evaluate_every=5"]
     options += ["--set", "run.evaluation_episodes=5"]
     for assignment in assignments:
         options += ["--set", assignment]
@@ -152,10 +160,10 @@ def measure_imitation(
     jobs: int,
     name: str,
     trajectories: list[int],
-    variants: dict[str, tuple[str, list[str]]],
+    variants: dict[str, tuple[str, list[str], float]],
 ) -> None:
     def one(environment: str, n: int, variant: str, seed: int) -> dict:
-        method, assignments = variants[variant]
+        method, assignments, times = variants[variant]
         # The full method is the same run in both experiments.
         folder, leaf = (
             ("imitation", "agail") if variant == "full" else (name, variant.replace(" ", "-"))
@@ -168,7 +176,8 @@ def measure_imitation(
             "variant": variant,
             "seed": seed,
         }
-        return head | imitate(run, environment, method, seed, demos, assignments)
+        timesteps = int(times * STEPS[environment])
+        return head | imitate(run, environment, method, seed, demos, assignments, timesteps)
 
     in_parallel(jobs, [lambda e=e, s=s: expert(work, e, s) for e in STEPS for s in EXPERT_SEEDS])
     for environment in STEPS:
@@ -204,22 +213,12 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=ROOT / "runs/measure")
     options = parser.parse_args()
     if options.experiment == "imitation":
-        methods = {
-            "agail": ("agail", []),
-            "gail": ("gail", []),
-            "state-gail": ("state-gail", []),
-            "bc": ("bc", []),
-            "bco": ("bco", []),
-        }
-        measure_imitation(options.work, options.jobs, "imitation", [10], methods)
+        methods = ["agail", "gail", "state-gail", "bc", "bco"]
+        variants = {method: (method, [], 1) for method in methods}
+        measure_imitation(options.work, options.jobs, "imitation", [10], variants)
     else:
-        measure_imitation(
-            options.work,
-            options.jobs,
-            "ablation",
-            [10, 3],
-            {v: ("agail", s) for v, s in OFF.items()},
-        )
+        variants = {name: ("agail", *variant) for name, variant in VARIANTS.items()}
+        measure_imitation(options.work, options.jobs, "ablation", [10, 3], variants)
 
 
 if __name__ == "__main__":
