@@ -102,13 +102,16 @@ def main() -> None:
     cells = [(e, n, m) for e in STEPS for n in (10, 3) for m in (0.5, 0.75)]
     table = [[one(work, *cell, seed) for seed in SEEDS] for cell in cells]
     write("time_to_policy", [row for cell in table for row in cell])
-    print("| environment | demonstrations | missing | median | worst | seeds that reach it |")
+    print("| environment | demonstrations | missing | median | worst | seeds that get there |")
     print("| --- | --- | --- | --- | --- | --- |")
     for (environment, trajectories, missing), cell in zip(cells, table, strict=True):
         times = [row["seconds"] if row["seconds"] != "" else float("inf") for row in cell]
         found = sum(t != float("inf") for t in times)
+        middle, worst = (
+            f"{t:.1f} s" if t != float("inf") else "-" for t in (median(times), max(times))
+        )
         print(
-            f"| {environment} | {trajectories} | {missing:.0%} | {median(times):.1f} s | {max(times):.1f} s | {found} of {len(times)} |"
+            f"| {environment} | {trajectories} | {missing:.0%} | {middle} | {worst} | {found} of {len(times)} |"
         )
 
 
