@@ -18,7 +18,8 @@ Policy::Policy(std::shared_ptr<const Implementation> implementation)
     : implementation_(std::move(implementation)) {}
 
 Policy Policy::load(const std::string& path) {
-  return Policy(std::make_shared<Implementation>(SavedPolicy::load(policy_file(path))));
+  return Policy(
+      std::make_shared<Implementation>(Implementation{SavedPolicy::load(policy_file(path))}));
 }
 
 Policy::Workspace::Workspace(const Policy& policy)

@@ -247,14 +247,14 @@ void multiply_few_rows(const ConstView<S>& a, const ConstView<S>& b, View<S> c, 
         const Result<S> to{c.data() + i + j * c.outerStride(), c.outerStride(), add || p > 0};
         const auto tile_of = [&]<int R>(std::integral_constant<int, R>) {
           dots<S, R, N>(from, kDots, right, packets, start, to);
-          i += R;
+          return Index{R};
         };
         if (m - i >= kRowsOfTile)
-          tile_of(std::integral_constant<int, kRowsOfTile>());
+          i += tile_of(std::integral_constant<int, kRowsOfTile>());
         else if (m - i == 2)
-          tile_of(std::integral_constant<int, 2>());
+          i += tile_of(std::integral_constant<int, 2>());
         else
-          tile_of(std::integral_constant<int, 1>());
+          i += tile_of(std::integral_constant<int, 1>());
       }
     };
     Index j = 0;
