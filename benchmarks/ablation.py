@@ -8,7 +8,8 @@
 Each part is a grid of `agail reproduce table1` in WORK/<part> (default runs/ablation) and goes on where it was stopped. The
 full method is the same cell of the experiment itself: FULL (default results/table1/default), with its experts in EXPERTS
 (default FULL/experts), which are made again if they are not there. Leaves what the runs said in results/table1/ablation:
-<part>/records, table.csv (the columns of `agail reproduce`, after the part that was off) and table.md.
+<part>/records, table.csv (the columns of `agail reproduce`, after the part that was off) and table.md; fills the table in
+docs/results.md.
 """
 
 import argparse
@@ -18,7 +19,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from machine import AGAIL, ROOT
+from machine import AGAIL, ROOT, fill
 
 RESULTS = ROOT / "results/table1/ablation"
 MISSING = "0.75"
@@ -80,6 +81,29 @@ def markdown(table: list[dict]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def overview(table: list[dict]) -> str:
+    """For docs/results.md: what is off by row, the environments on which it can tell by column."""
+    environments = ["Hopper-v4", "Walker2d-v4"]
+    lines = [f"| off | {' | | | '.join(environments)} | | |", "| --- " * 7 + "|"]
+    cell = {(row["off"], row["environment"]): row for row in table}
+    for off in [FULL, *OFF]:
+        cells = ["nothing" if off == FULL else off.replace("-", " ")]
+        for environment in environments:
+            row = cell.get((off, environment))
+            if row is None:  # not run
+                cells += ["-"] * 3
+                continue
+            share = float(row["share_of_expert"])
+            worst = share * float(row["worst_seed"]) / float(row["deterministic_mean"])
+            cells += [
+                f"{float(row['mean']):,.0f} ± {float(row['standard_error']):.0f}",
+                f"{100 * share:.1f} % ({100 * worst:.1f})",
+                f"{float(row['steps_to_95']):,.0f}" if row["steps_to_95"] else "never",
+            ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -108,6 +132,7 @@ def main() -> None:
         writer.writeheader()
         writer.writerows(table)
     (RESULTS / "table.md").write_text(markdown(table))
+    fill(ROOT / "docs/results.md", "ablation", overview(table))
     print(markdown(table), end="")
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Trains and evaluates what docs/results.md reports, and writes results/<experiment>.csv.
+"""Trains and evaluates what docs/results.md reports; writes results/<experiment>.csv and the table there.
 
     benchmarks/measure.py imitation    agail and what it is compared with, 10 demonstrations, 75 % of the actions missing, seeds 0-4
     benchmarks/measure.py ablation     agail with one part off at a time, less exploration, or more interactions, 10 and 3 demonstrations, seeds 0-4
@@ -20,7 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from statistics import mean
 
-from machine import AGAIL, ROOT
+from machine import AGAIL, ROOT, fill
 
 SEEDS = range(5)
 EPISODES = 50
@@ -188,20 +188,29 @@ def measure_imitation(
     ]
     rows = in_parallel(jobs, [lambda t=t: one(*t) for t in tasks])
     write(name, rows)
-    print("| environment | trajectories | variant | share | worst | to 95 % (median, seeds) |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    for key in dict.fromkeys((r["environment"], r["trajectories"], r["variant"]) for r in rows):
-        group = [r for r in rows if (r["environment"], r["trajectories"], r["variant"]) == key]
-        shares = [r["share_of_demonstrations"] for r in group]
-        reached = sorted(r["steps_to_95"] for r in group if r["steps_to_95"] != "")
-        to_95 = (
-            f"{reached[(len(reached) - 1) // 2]:,} ({len(reached)} of {len(group)})"
-            if reached
-            else "never"
+    fill(ROOT / "docs/results.md", f"measured {name}", markdown(rows))
+
+
+def markdown(rows: list[dict]) -> str:
+    lines = [
+        "| environment | demonstrations | variant | share, mean | worst seed | interactions to 95 %, median (seeds that reach it) |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    cells: dict[tuple, list[dict]] = {}
+    for row in rows:
+        cells.setdefault((row["environment"], row["trajectories"], row["variant"]), []).append(row)
+    for (environment, n, variant), cell in sorted(cells.items(), key=lambda item: item[0][0]):
+        shares = [row["share_of_demonstrations"] for row in cell]
+        reached = sorted(row["steps_to_95"] for row in cell if row["steps_to_95"] != "")
+        to_95 = "never"
+        if variant == "bc":  # it does not interact
+            to_95 = "-"
+        elif reached:
+            to_95 = f"{reached[(len(reached) - 1) // 2]:,} ({len(reached)} of {len(cell)})"
+        lines.append(
+            f"| {environment} | {n} | {variant} | {100 * mean(shares):.1f} % | {100 * min(shares):.1f} % | {to_95} |"
         )
-        print(
-            f"| {key[0]} | {key[1]} | {key[2]} | {mean(shares):.3f} | {min(shares):.3f} | {to_95} |"
-        )
+    return "\n".join(lines)
 
 
 def main() -> None:
