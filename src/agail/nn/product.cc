@@ -27,10 +27,26 @@ using Packet = typename Eigen::internal::packet_traits<S>::type;
 template <class S>
 inline constexpr int kWidth = Eigen::internal::packet_traits<S>::size;
 
+// For products with a single column: an action, between two steps of the physics. Multiplying
+// 512-bit packets makes many processors lower the core's clock for about a millisecond, in which
+// the physics would be up to a tenth slower. Every sum is added in the same order with either
+// packet.
+template <class S>
+using Narrow =
+    std::conditional_t<(sizeof(Packet<S>) > kNarrowBytes),
+                       typename Eigen::internal::unpacket_traits<Packet<S>>::half, Packet<S>>;
+
+// Of a packet V: its numbers' type, and how many there are.
+template <class V>
+using Scalar = typename Eigen::internal::unpacket_traits<V>::type;
+template <class V>
+inline constexpr int kLanes = Eigen::internal::unpacket_traits<V>::size;
+
 constexpr bool kManyRegisters = EIGEN_ARCH_DEFAULT_NUMBER_OF_REGISTERS >= 32;
 constexpr int kPackets = kManyRegisters ? 4 : 2;
-constexpr int kPacketsAlone = 8;  // of a tile with a single column
-constexpr Index kDepth = 256;     // steps of p at a time, so that a packed panel stays in the cache
+template <class V>  // of a tile with a single column
+constexpr int kPacketsAlone = kManyRegisters && sizeof(V) <= kNarrowBytes ? 16 : 8;
+constexpr Index kDepth = 256;  // steps of p at a time, so that a packed panel stays in the cache
 
 // One factor as a tile reads it: element (i, p) of a at a[i + p * step], or element (p, j) of b at
 // b[p * step + j * column].
@@ -65,25 +81,25 @@ struct Rows {
 };
 
 // Loops over indices known at compile time, which must be unrolled to keep the sums in registers.
-#define AGAIL_UNROLL _Pragma("GCC unroll 8")
+#define AGAIL_UNROLL _Pragma("GCC unroll 16")
 
-template <class S, int P, int N>
+template <class V, int P, int N, class S = Scalar<V>>
 [[gnu::always_inline]] inline void tile(Left<S> a, Right<S> b, Index depth, Result<S> c,
                                         Rows rows) {
-  Packet<S> sum[P][N];
+  V sum[P][N];
   AGAIL_UNROLL
   for (int j = 0; j < N; ++j) {
     AGAIL_UNROLL
-    for (int i = 0; i < P; ++i) sum[i][j] = pset1<Packet<S>>(S(0));
+    for (int i = 0; i < P; ++i) sum[i][j] = pset1<V>(S(0));
   }
   for (Index p = 0; p < depth; ++p, a.data += a.step, b.data += b.step) {
-    Packet<S> left[P];
+    V left[P];
     AGAIL_UNROLL
-    for (int i = 0; i + 1 < P; ++i) left[i] = ploadu<Packet<S>>(a.data + i * kWidth<S>);
-    left[P - 1] = ploadu<Packet<S>>(a.data + rows.last);
+    for (int i = 0; i + 1 < P; ++i) left[i] = ploadu<V>(a.data + i * kLanes<V>);
+    left[P - 1] = ploadu<V>(a.data + rows.last);
     AGAIL_UNROLL
     for (int j = 0; j < N; ++j) {
-      const auto right = pset1<Packet<S>>(b.data[j * b.column]);
+      const auto right = pset1<V>(b.data[j * b.column]);
       AGAIL_UNROLL
       for (int i = 0; i < P; ++i) sum[i][j] = pmadd(left[i], right, sum[i][j]);
     }
@@ -93,21 +109,21 @@ template <class S, int P, int N>
     S* column = c.data + j * c.column;
     AGAIL_UNROLL
     for (int i = 0; i < P; ++i) {
-      S* to = column + (i + 1 < P ? i * kWidth<S> : rows.last);
+      S* to = column + (i + 1 < P ? i * kLanes<V> : rows.last);
       if (!c.add) {  // lanes that overlap are the same sums once more
         pstoreu(to, sum[i][j]);
       } else if (i + 1 < P || rows.from == 0) {
-        pstoreu(to, padd(ploadu<Packet<S>>(to), sum[i][j]));
+        pstoreu(to, padd(ploadu<V>(to), sum[i][j]));
       } else {
-        S lanes[kWidth<S>];
+        S lanes[kLanes<V>];
         pstoreu(lanes, sum[i][j]);
-        for (Index r = rows.from; r < kWidth<S>; ++r) to[r] += lanes[r];
+        for (Index r = rows.from; r < kLanes<V>; ++r) to[r] += lanes[r];
       }
     }
   }
 }
 
-template <class S, int P>
+template <class V, int P, class S = Scalar<V>>
 void panel_of_packets(Left<S> a, Right<S> b, Index depth, Index columns, Result<S> c, Rows rows) {
   Index j = 0;
   const auto right = [&] { return Right<S>{b.data + j * b.column, b.step, b.column}; };
@@ -115,21 +131,21 @@ void panel_of_packets(Left<S> a, Right<S> b, Index depth, Index columns, Result<
   if constexpr (P <= kPackets) {
     constexpr int kColumns = columns_for(P);
     for (; j + kColumns <= columns; j += kColumns)
-      tile<S, P, kColumns>(a, right(), depth, result(), rows);
-    for (; j + 4 <= columns; j += 4) tile<S, P, 4>(a, right(), depth, result(), rows);
-    for (; j + 2 <= columns; j += 2) tile<S, P, 2>(a, right(), depth, result(), rows);
+      tile<V, P, kColumns>(a, right(), depth, result(), rows);
+    for (; j + 4 <= columns; j += 4) tile<V, P, 4>(a, right(), depth, result(), rows);
+    for (; j + 2 <= columns; j += 2) tile<V, P, 2>(a, right(), depth, result(), rows);
   }
-  for (; j < columns; ++j) tile<S, P, 1>(a, right(), depth, result(), rows);
+  for (; j < columns; ++j) tile<V, P, 1>(a, right(), depth, result(), rows);
 }
 
 // The panel with as many packets, found among those known at compile time.
-template <class S, int P = kPacketsAlone>
+template <class V, int P = kPacketsAlone<V>, class S = Scalar<V>>
 void panel(Index packets, Left<S> a, Right<S> b, Index depth, Index columns, Result<S> c,
            Rows rows) {
   if (packets == P)
-    panel_of_packets<S, P>(a, b, depth, columns, c, rows);
+    panel_of_packets<V, P>(a, b, depth, columns, c, rows);
   else if constexpr (P > 1)
-    panel<S, P - 1>(packets, a, b, depth, columns, c, rows);
+    panel<V, P - 1>(packets, a, b, depth, columns, c, rows);
 }
 
 // to[i + p * step] = from[p + i * column] for i < rows, zero for the other i < step.
@@ -154,12 +170,12 @@ void pack_transposed(const S* from, Index column, Index rows, Index depth, S* to
 
 enum class Lies { kPlain, kTransposed };
 
-// For m >= kWidth.
-template <class S, Lies lies>
+// For m >= kLanes<V>.
+template <class V, Lies lies, class S = Scalar<V>>
 void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Index n, Result<S> c) {
-  constexpr Index kW = kWidth<S>;
+  constexpr Index kW = kLanes<V>;
   alignas(64) S packed[kDepth * kPackets * kW];
-  const Index tallest = (lies == Lies::kPlain && n == 1 ? kPacketsAlone : kPackets);
+  const Index tallest = (lies == Lies::kPlain && n == 1 ? kPacketsAlone<V> : kPackets);
   for (Index p = 0; p < k; p += kDepth) {
     const Index depth = std::min(kDepth, k - p);
     const Right<S> right{b.data + p * b.step, b.step, b.column};
@@ -177,7 +193,7 @@ void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Inde
         left = {packed, packets * kW};
         pack_transposed(a + p + first * a_column, a_column, count, depth, packed, left.step);
       }
-      panel<S>(packets, left, right, depth, n, {c.data + first, c.column, c.add || p > 0}, rows);
+      panel<V>(packets, left, right, depth, n, {c.data + first, c.column, c.add || p > 0}, rows);
       done = first + count;
     }
   }
@@ -186,26 +202,48 @@ void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Inde
 // Few rows do not fill a packet: the products of a network's last layer, of which there are several
 // for each of the others.
 
-// Dot products of R rows, which lie `row_step` apart, with N columns of b, packets q to q + packets
-// of all; `start(q)` is where packet q begins in a column.
-template <class S, int R, int N, class Start>
-[[gnu::always_inline]] inline void dots(const S* rows, Index row_step, Right<S> b, Index packets,
+// Each is kWidth sums side by side, halved until one is left, whatever the packet V that holds
+// them.
+template <class V, class S = Scalar<V>>
+inline constexpr int kParts = kWidth<S> / kLanes<V>;
+
+template <class V, class S = Scalar<V>>
+S total(const V (&parts)[kParts<V>]) {
+  if constexpr (kParts<V> == 2)
+    return predux(padd(parts[0], parts[1]));
+  else if constexpr (sizeof(V) > kNarrowBytes)
+    return predux(Eigen::internal::predux_half_dowto4(parts[0]));
+  else
+    return predux(parts[0]);
+}
+
+// Dot products of R rows, which lie `row_step` apart, with N columns of b, groups of kWidth numbers
+// 0 to `groups`; `start(q)` is where group q begins in a column.
+template <class V, int R, int N, class Start, class S = Scalar<V>>
+[[gnu::always_inline]] inline void dots(const S* rows, Index row_step, Right<S> b, Index groups,
                                         const Start& start, Result<S> c) {
-  Packet<S> sum[R][N];
+  V sum[R][N][kParts<V>];
   AGAIL_UNROLL
   for (int i = 0; i < R; ++i) {
     AGAIL_UNROLL
-    for (int j = 0; j < N; ++j) sum[i][j] = pset1<Packet<S>>(S(0));
-  }
-  for (Index q = 0; q < packets; ++q) {
-    Packet<S> left[R];
-    AGAIL_UNROLL
-    for (int i = 0; i < R; ++i) left[i] = ploadu<Packet<S>>(rows + i * row_step + q * kWidth<S>);
-    AGAIL_UNROLL
     for (int j = 0; j < N; ++j) {
-      const auto right = ploadu<Packet<S>>(b.data + start(q) + j * b.column);
       AGAIL_UNROLL
-      for (int i = 0; i < R; ++i) sum[i][j] = pmadd(left[i], right, sum[i][j]);
+      for (V& part : sum[i][j]) part = pset1<V>(S(0));
+    }
+  }
+  for (Index q = 0; q < groups; ++q) {
+    AGAIL_UNROLL
+    for (int part = 0; part < kParts<V>; ++part) {
+      const S* from = rows + q * kWidth<S> + part * kLanes<V>;
+      V left[R];
+      AGAIL_UNROLL
+      for (int i = 0; i < R; ++i) left[i] = ploadu<V>(from + i * row_step);
+      AGAIL_UNROLL
+      for (int j = 0; j < N; ++j) {
+        const auto right = ploadu<V>(b.data + start(q) + part * kLanes<V> + j * b.column);
+        AGAIL_UNROLL
+        for (int i = 0; i < R; ++i) sum[i][j][part] = pmadd(left[i], right, sum[i][j][part]);
+      }
     }
   }
   AGAIL_UNROLL
@@ -213,14 +251,14 @@ template <class S, int R, int N, class Start>
     AGAIL_UNROLL
     for (int i = 0; i < R; ++i) {
       S& to = c.data[i + j * c.column];
-      to = c.add ? to + predux(sum[i][j]) : predux(sum[i][j]);
+      to = c.add ? to + total(sum[i][j]) : total(sum[i][j]);
     }
   }
 }
 
 // c = a b for m < kWidth <= k: dot products of rows of a, copied to lie side by side, with columns
-// of b. The last packet overlaps the one before it; there a's copy holds zeros.
-template <class S>
+// of b. The last group overlaps the one before it; there a's copy holds zeros.
+template <class V, class S = Scalar<V>>
 void multiply_few_rows(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add) {
   constexpr Index kW = kWidth<S>;
   constexpr Index kDots = 8 * kW;  // elements of a row at a time
@@ -229,13 +267,13 @@ void multiply_few_rows(const ConstView<S>& a, const ConstView<S>& b, View<S> c, 
   const Index m = a.rows(), k = a.cols(), n = b.cols();
   for (Index p = 0; p < k; p += kDots) {
     const Index depth = std::min(kDots, k - p);
-    const Index packets = (depth + kW - 1) / kW;
-    const Index overlap = packets * kW - depth;
-    const auto start = [&](Index q) { return p + q * kW - (q + 1 < packets ? 0 : overlap); };
+    const Index groups = (depth + kW - 1) / kW;
+    const Index overlap = groups * kW - depth;
+    const auto start = [&](Index q) { return p + q * kW - (q + 1 < groups ? 0 : overlap); };
     for (Index i = 0; i < m; ++i) {
       const S* from = a.data() + i + p * a.outerStride();
       S* to = rows + i * kDots;
-      const Index whole = (packets - 1) * kW;
+      const Index whole = (groups - 1) * kW;
       for (Index t = 0; t < whole; ++t) to[t] = from[t * a.outerStride()];
       std::fill_n(to + whole, overlap, S(0));
       for (Index t = whole; t < depth; ++t) to[t + overlap] = from[t * a.outerStride()];
@@ -246,7 +284,7 @@ void multiply_few_rows(const ConstView<S>& a, const ConstView<S>& b, View<S> c, 
         const S* from = rows + i * kDots;
         const Result<S> to{c.data() + i + j * c.outerStride(), c.outerStride(), add || p > 0};
         const auto tile_of = [&]<int R>(std::integral_constant<int, R>) {
-          dots<S, R, N>(from, kDots, right, packets, start, to);
+          dots<V, R, N>(from, kDots, right, groups, start, to);
           return Index{R};
         };
         if (m - i >= kRowsOfTile)
@@ -274,8 +312,9 @@ void multiply_few_rows_by_transposed(const ConstView<S>& a, const ConstView<S>& 
   for (Index done = 0; done < n; done += kRows) {
     const Index first = std::max<Index>(0, std::min(done, n - kRows));
     const Index rows = std::min(kRows, n - first);
-    multiply_any<S, Lies::kPlain>(b.data() + first, b.outerStride(), rows, k,
-                                  {a.data(), a.outerStride(), 1}, m, {transposed, rows, false});
+    multiply_any<Packet<S>, Lies::kPlain>(b.data() + first, b.outerStride(), rows, k,
+                                          {a.data(), a.outerStride(), 1}, m,
+                                          {transposed, rows, false});
     for (Index r = done - first; r < rows; ++r)
       for (Index i = 0; i < m; ++i) {
         S& to = c(i, first + r);
@@ -295,13 +334,20 @@ template <class S>
 void multiply(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add) {
   eigen_assert(a.cols() == b.rows() && c.rows() == a.rows() && c.cols() == b.cols());
   count_flops(2 * a.size() * c.cols());
-  if (a.rows() >= kWidth<S> && a.cols() > 0)
-    multiply_any<S, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
-                                  {b.data(), 1, b.outerStride()}, b.cols(),
-                                  {c.data(), c.outerStride(), add});
-  else if (a.cols() >= kWidth<S>)
-    multiply_few_rows<S>(a, b, c, add);
-  else if (add)
+  const auto with_packets = [&]<class V>(std::type_identity<V>) {
+    if (a.rows() >= kWidth<S>)
+      multiply_any<V, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
+                                    {b.data(), 1, b.outerStride()}, b.cols(),
+                                    {c.data(), c.outerStride(), add});
+    else
+      multiply_few_rows<V>(a, b, c, add);
+  };
+  if (a.cols() >= kWidth<S> || (a.rows() >= kWidth<S> && a.cols() > 0)) {
+    if (c.cols() == 1)
+      with_packets(std::type_identity<Narrow<S>>());
+    else
+      with_packets(std::type_identity<Packet<S>>());
+  } else if (add)
     c.noalias() += a * b;
   else
     c.noalias() = a * b;
@@ -312,9 +358,9 @@ void multiply_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S> c
   eigen_assert(a.rows() == b.rows() && c.rows() == a.cols() && c.cols() == b.cols());
   count_flops(2 * a.size() * c.cols());
   if (a.cols() >= kWidth<S> && a.rows() > 0)
-    multiply_any<S, Lies::kTransposed>(a.data(), a.outerStride(), a.cols(), a.rows(),
-                                       {b.data(), 1, b.outerStride()}, b.cols(),
-                                       {c.data(), c.outerStride(), false});
+    multiply_any<Packet<S>, Lies::kTransposed>(a.data(), a.outerStride(), a.cols(), a.rows(),
+                                               {b.data(), 1, b.outerStride()}, b.cols(),
+                                               {c.data(), c.outerStride(), false});
   else
     c.noalias() = a.transpose() * b;
 }
@@ -324,9 +370,9 @@ void multiply_by_transposed(const ConstView<S>& a, const ConstView<S>& b, View<S
   eigen_assert(a.cols() == b.cols() && c.rows() == a.rows() && c.cols() == b.rows());
   count_flops(2 * a.size() * c.cols());
   if (a.rows() >= kWidth<S> && a.cols() > 0)
-    multiply_any<S, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
-                                  {b.data(), b.outerStride(), 1}, b.rows(),
-                                  {c.data(), c.outerStride(), add});
+    multiply_any<Packet<S>, Lies::kPlain>(a.data(), a.outerStride(), a.rows(), a.cols(),
+                                          {b.data(), b.outerStride(), 1}, b.rows(),
+                                          {c.data(), c.outerStride(), add});
   else if (b.rows() >= kWidth<S> && a.cols() > 0)
     multiply_few_rows_by_transposed<S>(a, b, c, add);
   else if (add)

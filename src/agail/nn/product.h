@@ -7,6 +7,10 @@
 
 namespace agail {
 
+// What acting, one column at a time, computes with at most, though the processor has wider packets:
+// those would slow the physics down (product.cc).
+inline constexpr int kNarrowBytes = 32;
+
 // c = a b, or c += a b. a: m x k, b: k x n, c: m x n; c overlaps neither.
 template <class S>
 void multiply(const ConstView<S>& a, const ConstView<S>& b, View<S> c, bool add = false);
