@@ -67,10 +67,8 @@ TEST_P(GuideNetworkTest, LossAndGradient) {
   ThreadPool pool(1);
   ChunkSums<double> sums(network_.parameters() + 1, kSamples);
   std::vector<Scratch<double>> scratch{network_.mlp.make_scratch()};
-  Tape<double> tape = network_.mlp.make_tape(kSamples);
   const auto loss = [&](const Vector<double>& theta, Vector<double>& gradient) {
-    return network_.loss(pool, sums, scratch, theta, x_, targets_, available_, kSamples, tape,
-                         gradient);
+    return network_.loss(pool, sums, scratch, theta, x_, targets_, available_, kSamples, gradient);
   };
   Vector<double> gradient(theta_.size()), ignored(theta_.size());
   EXPECT_NEAR(loss(theta_, gradient), reference_loss(numbers(theta_)), 1e-12);
@@ -90,13 +88,11 @@ TEST_P(GuideNetworkTest, FirstLayerStaysSeparated) {
   ThreadPool pool(1);
   ChunkSums<double> sums(network_.parameters() + 1, kSamples);
   std::vector<Scratch<double>> scratch{network_.mlp.make_scratch()};
-  Tape<double> tape = network_.mlp.make_tape(kSamples);
   Adam<double> adam(theta_.size());
   Vector<double> gradient(theta_.size());
   double first = 0, last = 0;
   for (int step = 0; step < 100; ++step) {
-    last = network_.loss(pool, sums, scratch, theta_, x_, targets_, available_, kSamples, tape,
-                         gradient);
+    last = network_.loss(pool, sums, scratch, theta_, x_, targets_, available_, kSamples, gradient);
     if (step == 0) first = last;
     adam.descend(pool, theta_, gradient, 1e-2);
   }
@@ -176,7 +172,7 @@ TEST_P(GuideTest, LearnsATableOfActions) {
     acted(0, j) = static_cast<float>(j / kEach % 3);
   }
   for (const std::string reward : {"log-likelihood", "likelihood"}) {
-    Guide guide(demos, space, settings(reward), 128, 5, pool_, kSamples, 1);
+    Guide guide(demos, space, settings(reward), 128, 5, pool_, 1);
     train(guide, policy);
     // Adam's steps keep moving it around the optimum: the mean over some updates.
     constexpr std::uint32_t kAveraged = 40;
@@ -244,7 +240,7 @@ TEST_P(GuideTest, LearnsALinearGaussian) {
     return -0.5 * z * z - std::log(0.2) - 0.5 * std::log(2 * std::numbers::pi);
   };
 
-  Guide guide(demos, space, settings("log-likelihood"), 128, 5, pool_, kDemos, 1);
+  Guide guide(demos, space, settings("log-likelihood"), 128, 5, pool_, 1);
   train(guide, policy);
   // Visited: the demonstrated states themselves, with actions near the demonstrator's.
   Matrix<float> acted(1, kDemos);
@@ -306,7 +302,7 @@ TEST_P(GuideTest, LikelihoodIsTheDensityOverItsPeak) {
   const Normalizer identity(1, false, 5);
   const Matrix<float> acted = reference::normal_matrix(1, 200, 3).cast<float>();
   const auto rewards = [&](const std::string& form) {
-    Guide guide(demos, space, settings(form), 64, 5, pool_, 200, 1);
+    Guide guide(demos, space, settings(form), 64, 5, pool_, 1);
     guide.learn({network, theta, identity}, 8, 0);
     Vector<float> result(200);
     guide.rewards(demos.states, acted, 200, 3, result);
@@ -334,10 +330,10 @@ TEST_P(GuideTest, SameBitsForAnyNumberOfThreadsAndFromAnArchive) {
   Vector<float> first;
   for (const int threads : {1, 2, 3}) {
     ThreadPool pool(threads);
-    Guide guide(demos, space, settings("likelihood"), 100, 5, pool, 300, 1);
+    Guide guide(demos, space, settings("likelihood"), 100, 5, pool, 1);
     guide.learn(policy, 3, 0);
     TensorStore store = archived(guide);
-    Guide resumed(demos, space, settings("likelihood"), 100, 5, pool, 300, 1);
+    Guide resumed(demos, space, settings("likelihood"), 100, 5, pool, 1);
     Archive load(store, Archive::Mode::kLoad);
     resumed.archive(load);
     GuideReport report;

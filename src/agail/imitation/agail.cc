@@ -40,7 +40,7 @@ AdversarialReward::AdversarialReward(const std::string& method, const DemoData& 
   if (method == "agail" && beta_ > 0 && !demos.some_action.empty())
     guide_ =
         std::make_unique<Guide>(demos, action, settings.guide, settings.discriminator.minibatch,
-                                settings.policy.observation_clip, team, capacity, seed);
+                                settings.policy.observation_clip, team, seed);
 }
 
 // Algorithm 1 of the paper, for one batch of trajectories tau ~ pi:

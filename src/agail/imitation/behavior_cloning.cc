@@ -56,7 +56,6 @@ CloningTerm::CloningTerm(const PolicyNetwork<float>& network, const Normalizer& 
       x_(Matrix<float>::Zero(padded(network.mlp.inputs() + 1), settings.minibatch)),
       actions_(Matrix<float>::Zero(targets_.actions.rows(), settings.minibatch)),
       available_(actions_),
-      tape_(network.mlp.make_tape(settings.minibatch)),
       sums_(network.parameters(), settings.minibatch),
       scalar_sums_(1, settings.minibatch) {
   for (int i = 0; i < pool.threads(); ++i)
@@ -86,11 +85,12 @@ double CloningTerm::total_log_likelihood(const Vector<float>& theta) {
   const Index n = x_.cols();
   const auto total =
       scalar_sums_.sum(pool_, n, [&](Index, int w, Index first, Index count, double* out) {
-        mlp.forward(theta.data(), x_.block(0, first, mlp.inputs() + 1, count), tape_, first);
-        auto row = workers_[static_cast<std::size_t>(w)].row.head(count);
+        auto& [scratch, whole_row] = workers_[static_cast<std::size_t>(w)];
+        mlp.forward(theta.data(), x_.block(0, first, mlp.inputs() + 1, count), scratch.tape, 0);
+        auto row = whole_row.head(count);
         const ConstView<float> mask = available_.block(0, first, available_.rows(), count);
         network_.distribution.log_prob(
-            mlp.output(tape_, first, count), network_.log_std(theta.data()),
+            mlp.output(scratch.tape, 0, count), network_.log_std(theta.data()),
             actions_.block(0, first, actions_.rows(), count), &mask, row);
         out[0] = 0;
         for (Index j = 0; j < count; ++j) out[0] += static_cast<double>(row[j]);
@@ -104,16 +104,17 @@ void CloningTerm::add_gradient(const Vector<float>& theta, Vector<float>& gradie
   gradient += sums_.sum(pool_, n, [&](Index, int w, Index first, Index count, float* out) {
     Worker& worker = workers_[static_cast<std::size_t>(w)];
     const auto input = x_.block(0, first, mlp.inputs() + 1, count);
-    mlp.forward(theta.data(), input, tape_, first);
+    Tape<float>& tape = worker.scratch.tape;
+    mlp.forward(theta.data(), input, tape, 0);
     auto weight = worker.row.head(count);
     weight.setConstant(static_cast<float>(weight_ / static_cast<double>(n)));
     const ConstView<float> mask = available_.block(0, first, available_.rows(), count);
     View<float> adjoint = worker.scratch.d.block(0, 0, mlp.outputs(), count);
     std::fill_n(network_.log_std(out), network_.distribution.log_stds(), 0.0F);
-    network_.distribution.score(mlp.output(tape_, first, count), network_.log_std(theta.data()),
+    network_.distribution.score(mlp.output(tape, 0, count), network_.log_std(theta.data()),
                                 actions_.block(0, first, actions_.rows(), count), &mask, weight,
                                 adjoint, network_.log_std(out));
-    mlp.backward(theta.data(), input, tape_, first, adjoint, out, worker.scratch);
+    mlp.backward(theta.data(), input, tape, 0, adjoint, out, worker.scratch);
   });
 }
 

@@ -54,7 +54,6 @@ class CloningTerm : public AuxiliaryTerm {
   std::int64_t update_ = 0;
   double weight_ = 0, log_likelihood_ = 0;
   Matrix<float> x_, actions_, available_;
-  Tape<float> tape_;
   ChunkSums<float> sums_;
   ChunkSums<double> scalar_sums_;
   struct Worker {

@@ -47,7 +47,6 @@ DiscriminatorLoss<S>::DiscriminatorLoss(const Mlp<S>& mlp, const DiscriminatorSe
     : mlp_(mlp),
       settings_(settings),
       pool_(pool),
-      tape_(mlp.make_tape(3 * padded(settings.minibatch))),
       sums_(mlp.parameters(), 3 * (chunk_count(settings.minibatch) + 1) * kChunk),
       chunk_reports_(Matrix<double>::Zero(4, 3 * (chunk_count(settings.minibatch) + 1))) {
   for (int i = 0; i < pool.threads(); ++i)
@@ -75,21 +74,21 @@ DiscriminatorReport DiscriminatorLoss<S>::gradient(const Vector<S>& theta, const
         const Index n = std::min(kChunk, m - first);
         auto report = chunk_reports_.col(chunk);
         report.setZero();
-        const Index column = kind * m + first;  // in the tape
+        Tape<S>& tape = worker.scratch.tape;
         if (kind == 2) {
           const auto points = between.block(0, first, rows, n);
-          mlp_.forward(theta.data(), points, tape_, column);
+          mlp_.forward(theta.data(), points, tape, 0);
           std::fill_n(out, mlp_.parameters(), S(0));
-          report[3] = mlp_.add_gradient_penalty(theta.data(), points, tape_, column,
+          report[3] = mlp_.add_gradient_penalty(theta.data(), points, tape, 0,
                                                 static_cast<S>(settings_.gradient_penalty) * scale,
                                                 out, worker.scratch);
           return;
         }
-        const auto samples = x.block(0, column, rows, n);
-        mlp_.forward(theta.data(), samples, tape_, column);
+        const auto samples = x.block(0, kind * m + first, rows, n);
+        mlp_.forward(theta.data(), samples, tape, 0);
         View<S> adjoint = worker.adjoint.leftCols(n);
         for (Index j = 0; j < n; ++j) {
-          const S d = tape_.outputs.back()(0, column + j);
+          const S d = tape.outputs.back()(0, j);
           const S p = sigmoid(d);
           // -log(1 - P) = softplus(d), derivative P;  -log P = softplus(-d), derivative P - 1;
           // H = softplus(d) - d P, derivative -d P (1 - P), averaged over both kinds.
@@ -101,7 +100,7 @@ DiscriminatorReport DiscriminatorLoss<S>::gradient(const Vector<S>& theta, const
           const bool right = kind == 0 ? d < S(0) : d > S(0);
           report[1 + kind] += right ? static_cast<double>(scale) : 0.0;
         }
-        mlp_.backward(theta.data(), samples, tape_, column, adjoint, out, worker.scratch);
+        mlp_.backward(theta.data(), samples, tape, 0, adjoint, out, worker.scratch);
       });
   const Index chunks = (penalised ? 3 : 2) * kind_chunks;
   const Eigen::Vector4d total = chunk_reports_.leftCols(chunks).rowwise().sum();
@@ -127,8 +126,6 @@ Discriminator::Discriminator(int observation_dim, const ActionSpace& action, boo
       theta_(Vector<float>::Zero(mlp_.parameters())),
       adam_(mlp_.parameters()),
       loss_(mlp_, settings, team.pool()),
-      reward_tape_(mlp_.make_tape(capacity)),
-      inputs_(Matrix<float>::Zero(padded(mlp_.inputs() + 1), capacity)),
       minibatch_(Matrix<float>::Zero(padded(mlp_.inputs() + 1), 2 * settings.minibatch)),
       between_(Matrix<float>::Zero(padded(mlp_.inputs() + 1), settings.minibatch)),
       new_states_(
@@ -136,6 +133,9 @@ Discriminator::Discriminator(int observation_dim, const ActionSpace& action, boo
       gradient_(Vector<float>::Zero(mlp_.parameters())) {
   RandomStream random(seed, Purpose::kInitialise, 2);
   mlp_.initialise(theta_.data(), random, 0.1);
+  for (int i = 0; i < team.pool().threads(); ++i)
+    workers_.push_back(
+        {mlp_.make_tape(kChunk), Matrix<float>::Zero(padded(mlp_.inputs() + 1), kChunk)});
   policy_order_.reserve(static_cast<std::size_t>(capacity));
 }
 
@@ -202,12 +202,16 @@ DiscriminatorReport Discriminator::learn(const Samples& policy, const Samples& d
 void Discriminator::rewards(const Samples& policy, Vector<float>& rewards) {
   const std::string& form = settings_.reward;
   const int kind = form == "softplus" ? 0 : form == "log-odds" ? 1 : form == "probability" ? 2 : 3;
-  for_each_chunk(team_, policy.n, [&](int, Index first, Index n) {
-    for (Index j = first; j < first + n; ++j) build_input(policy, j, inputs_.col(j).data());
-    mlp_.forward(theta_.data(), inputs_.block(0, first, mlp_.inputs() + 1, n), reward_tape_, first);
-    for (Index j = first; j < first + n; ++j) {
-      const float d = reward_tape_.outputs.back()(0, j);
-      rewards[j] = kind == 0 ? softplus(d) : kind == 1 ? d : kind == 2 ? sigmoid(d) : -softplus(-d);
+  for_each_chunk(team_, policy.n, [&](int w, Index first, Index n) {
+    auto& [tape, x] = workers_[static_cast<std::size_t>(w)];
+    for (Index j = 0; j < n; ++j) build_input(policy, first + j, x.col(j).data());
+    mlp_.forward(theta_.data(), x.block(0, 0, mlp_.inputs() + 1, n), tape, 0);
+    for (Index j = 0; j < n; ++j) {
+      const float d = tape.outputs.back()(0, j);
+      rewards[first + j] = kind == 0   ? softplus(d)
+                           : kind == 1 ? d
+                           : kind == 2 ? sigmoid(d)
+                                       : -softplus(-d);
     }
   });
   gather_chunks(team_, policy.n, rewards);

@@ -39,7 +39,6 @@ class DiscriminatorLoss {
   const Mlp<S>& mlp_;
   DiscriminatorSettings settings_;
   ThreadPool& pool_;
-  Tape<S> tape_;
   ChunkSums<S> sums_;
   Matrix<double> chunk_reports_;
   struct Worker {
@@ -95,10 +94,14 @@ class Discriminator {
   Vector<float> theta_;
   Adam<float> adam_;
   DiscriminatorLoss<float> loss_;
-  Tape<float> reward_tape_;
-  Matrix<float> inputs_, minibatch_, between_, new_states_;
+  Matrix<float> minibatch_, between_, new_states_;
   Vector<float> gradient_;
   std::vector<Index> policy_order_, demo_order_;
+  struct Worker {  // of rewards(): a chunk
+    Tape<float> tape;
+    Matrix<float> x;
+  };
+  std::vector<Worker> workers_;
 };
 
 }  // namespace agail

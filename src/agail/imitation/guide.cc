@@ -55,15 +55,14 @@ void GuideNetwork<S>::initialise(S* theta, RandomStream& random) const {
 template <class S>
 double GuideNetwork<S>::loss(ThreadPool& pool, ChunkSums<S>& sums, std::vector<Scratch<S>>& scratch,
                              const Vector<S>& theta, const Matrix<S>& x, const Matrix<S>& targets,
-                             const Matrix<S>& available, Index n, Tape<S>& tape,
-                             Vector<S>& gradient) const {
+                             const Matrix<S>& available, Index n, Vector<S>& gradient) const {
   const Index p = parameters();
   // The loss itself travels as one more number behind the gradient.
   const auto total = sums.sum(pool, n, [&](Index, int w, Index first, Index count, S* out) {
     Scratch<S>& space = scratch[static_cast<std::size_t>(w)];
     const auto input = x.block(0, first, mlp.inputs() + 1, count);
-    mlp.forward(theta.data(), input, tape, first);
-    const auto output = mlp.output(tape, first, count);
+    mlp.forward(theta.data(), input, space.tape, 0);
+    const auto output = mlp.output(space.tape, 0, count);
     const auto target = targets.block(0, first, targets.rows(), count);
     const ConstView<S> mask = available.block(0, first, available.rows(), count);
     Eigen::Matrix<S, 1, Eigen::Dynamic, Eigen::RowMajor, 1, kChunk> weight(count),
@@ -75,7 +74,7 @@ double GuideNetwork<S>::loss(ThreadPool& pool, ChunkSums<S>& sums, std::vector<S
     S* d_log_std = out + mlp.parameters();
     std::fill_n(d_log_std, distribution.log_stds(), S(0));
     distribution.score(output, log_std(theta.data()), target, &mask, weight, adjoint, d_log_std);
-    mlp.backward(theta.data(), input, tape, first, adjoint, out, space);
+    mlp.backward(theta.data(), input, space.tape, 0, adjoint, out, space);
     separate(out);
   });
   gradient = total.head(p);
@@ -86,7 +85,7 @@ template class GuideNetwork<float>;
 template class GuideNetwork<double>;
 
 Guide::Guide(const DemoData& demos, const ActionSpace& action, const GuideSettings& settings,
-             Index minibatch, double clip, Team team, Index capacity, std::uint64_t seed)
+             Index minibatch, double clip, Team team, std::uint64_t seed)
     : demos_(demos),
       action_(action),
       settings_(settings),
@@ -99,12 +98,11 @@ Guide::Guide(const DemoData& demos, const ActionSpace& action, const GuideSettin
       adam_(network_.parameters()),
       known_dimensions_(static_cast<std::size_t>(action.dim)),
       sums_(network_.parameters() + 1, minibatch),
-      tape_(network_.mlp.make_tape(
-          std::max({capacity, minibatch, kHeldOutAtMost, kDiagnosticStates * kActionsAState}))),
+      tape_(network_.mlp.make_tape(std::max(kHeldOutAtMost, kDiagnosticStates * kActionsAState))),
       x_(Matrix<float>::Zero(padded(network_.mlp.inputs() + 1), minibatch)),
       targets_(Matrix<float>::Zero(action.dim, minibatch)),
       available_(targets_),
-      reward_x_(Matrix<float>::Zero(x_.rows(), tape_.outputs.back().cols())),
+      diagnostic_x_(Matrix<float>::Zero(x_.rows(), tape_.outputs.back().cols())),
       gradient_(Vector<float>::Zero(network_.parameters())),
       sampled_(static_cast<std::size_t>(action.dim)),
       executed_(sampled_),
@@ -113,7 +111,10 @@ Guide::Guide(const DemoData& demos, const ActionSpace& action, const GuideSettin
   AGAIL_CHECK(!demos.some_action.empty());
   RandomStream random(seed, Purpose::kInitialise, 3);
   network_.initialise(theta_.data(), random);
-  for (int i = 0; i < team.pool().threads(); ++i) scratch_.push_back(network_.mlp.make_scratch());
+  for (int i = 0; i < team.pool().threads(); ++i) {
+    scratch_.push_back(network_.mlp.make_scratch());
+    chunk_x_.push_back(Matrix<float>::Zero(x_.rows(), kChunk));
+  }
   normalizer_.update(team.pool(), demos.states);
 
   std::vector<Index> columns = demos.some_action;
@@ -179,7 +180,7 @@ GuideReport Guide::learn(const PolicyView& policy, Index minibatches, std::uint3
       available_.col(j) = demos_.available.col(column);
     }
     const double loss = network_.loss(team_.pool(), sums_, scratch_, theta_, x_, targets_,
-                                      available_, minibatch_, tape_, gradient_);
+                                      available_, minibatch_, gradient_);
     adam_.descend(team_.pool(), theta_, gradient_, settings_.learning_rate);
     auto log_std = theta_.tail(network_.distribution.log_stds());
     log_std = log_std.cwiseMax(kLogStdFloor);
@@ -216,13 +217,14 @@ Index Guide::target_column(const float* state, RandomStream& random) const {
 
 void Guide::rewards(const Matrix<float>& states, const Matrix<float>& actions, Index n,
                     std::uint32_t update, Vector<float>& rewards) {
-  for_each_chunk(team_, n, [&](int, Index first, Index count) {
-    for (Index j = first; j < first + count; ++j)
-      build_input(states.col(j).data(), actions.col(j).data(), reward_x_.col(j).data());
-    network_.mlp.forward(theta_.data(), reward_x_.block(0, first, network_.mlp.inputs() + 1, count),
-                         tape_, first);
+  for_each_chunk(team_, n, [&](int w, Index first, Index count) {
+    Tape<float>& tape = scratch_[static_cast<std::size_t>(w)].tape;
+    Matrix<float>& x = chunk_x_[static_cast<std::size_t>(w)];
+    for (Index j = 0; j < count; ++j)
+      build_input(states.col(first + j).data(), actions.col(first + j).data(), x.col(j).data());
+    network_.mlp.forward(theta_.data(), x.block(0, 0, network_.mlp.inputs() + 1, count), tape, 0);
     for (Index j = first; j < first + count; ++j) {
-      const float* output = tape_.outputs.back().col(j).data();
+      const float* output = tape.outputs.back().col(j - first).data();
       if (sees_action()) {
         RandomStream random(seed_, Purpose::kGuideReward, 0, update, static_cast<std::uint32_t>(j));
         const Index column = target_column(states.col(j).data(), random);
@@ -245,8 +247,9 @@ void Guide::diagnose(const PolicyView& policy, const Matrix<float>& states, Inde
 
 void Guide::run_guide(Index columns) {
   for_each_chunk(team_.pool(), columns, [&](int, Index first, Index count) {
-    network_.mlp.forward(theta_.data(), reward_x_.block(0, first, network_.mlp.inputs() + 1, count),
-                         tape_, first);
+    network_.mlp.forward(theta_.data(),
+                         diagnostic_x_.block(0, first, network_.mlp.inputs() + 1, count), tape_,
+                         first);
   });
 }
 
@@ -261,7 +264,7 @@ double Guide::held_out_log_likelihood(const PolicyView& policy, RandomStream& ra
   }
   for (Index j = 0; j < held; ++j) {
     if (sees_action()) act(policy, j, random, executed_.data());
-    build_input(demos_.states.col(column(j)).data(), executed_.data(), reward_x_.col(j).data());
+    build_input(demos_.states.col(column(j)).data(), executed_.data(), diagnostic_x_.col(j).data());
   }
   run_guide(held);
   double sum = 0;
@@ -288,7 +291,7 @@ double Guide::action_variance_share(const PolicyView& policy, const Matrix<float
     for (Index k = 0; k < kActionsAState; ++k) {
       const Index j = s * kActionsAState + k;
       act(policy, s, random, fresh_actions_.col(j).data());
-      build_input(state(s), fresh_actions_.col(j).data(), reward_x_.col(j).data());
+      build_input(state(s), fresh_actions_.col(j).data(), diagnostic_x_.col(j).data());
     }
   run_guide(count * kActionsAState);
   double within = 0, sum = 0, squares = 0;

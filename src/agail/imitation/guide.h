@@ -51,10 +51,10 @@ class GuideNetwork {
   void initialise(S* theta, RandomStream& random) const;
 
   // Mean loss -log Q over n columns and its gradient. x: inputs with ones; targets, available:
-  // action_dim x n. Needs a tape of n columns.
+  // action_dim x n.
   double loss(ThreadPool& pool, ChunkSums<S>& sums, std::vector<Scratch<S>>& scratch,
               const Vector<S>& theta, const Matrix<S>& x, const Matrix<S>& targets,
-              const Matrix<S>& available, Index n, Tape<S>& tape, Vector<S>& gradient) const;
+              const Matrix<S>& available, Index n, Vector<S>& gradient) const;
 
   ActionDistribution<S> distribution;
   Mlp<S> mlp;
@@ -73,7 +73,7 @@ class Guide {
  public:
   // Needs at least one available action.
   Guide(const DemoData& demos, const ActionSpace& action, const GuideSettings& settings,
-        Index minibatch, double clip, Team team, Index capacity, std::uint64_t seed);
+        Index minibatch, double clip, Team team, std::uint64_t seed);
   ~Guide();
 
   // `minibatches` steps of Adam. `update` numbers the call.
@@ -96,7 +96,7 @@ class Guide {
   void show_policy(const PolicyView& policy, const float* state, Index slot);
   void run_policy(const PolicyView& policy, Index slots);
   void act(const PolicyView& policy, Index slot, RandomStream& random, float* executed);
-  // Q's outputs for the first columns of reward_x_, into tape_.
+  // Q's outputs for the first columns of diagnostic_x_, into tape_.
   void run_guide(Index columns);
   double held_out_log_likelihood(const PolicyView& policy, RandomStream& random);
   double action_variance_share(const PolicyView& policy, const Matrix<float>& states, Index n,
@@ -123,8 +123,9 @@ class Guide {
   std::unique_ptr<NearestState> nearest_;   // guide.target = nearest
   ChunkSums<float> sums_;
   std::vector<Scratch<float>> scratch_;
+  std::vector<Matrix<float>> chunk_x_;  // of rewards(), one a worker
   Tape<float> tape_, policy_tape_;
-  Matrix<float> policy_input_, x_, targets_, available_, reward_x_;
+  Matrix<float> policy_input_, x_, targets_, available_, diagnostic_x_;
   Vector<float> gradient_;
   std::vector<float> sampled_, executed_;
   std::vector<Index> drawn_;

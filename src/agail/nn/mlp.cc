@@ -35,7 +35,7 @@ Scratch<S> Mlp<S>::make_scratch() const {
   const Index rows = padded(*std::max_element(sizes_.begin(), sizes_.end()) + 1);
   const Matrix<S> zero = Matrix<S>::Zero(rows, kChunk);
   const std::vector<Matrix<S>> hidden(static_cast<std::size_t>(layers()) - 1, zero);
-  return {zero, zero, zero, zero, zero, hidden, hidden};
+  return {zero, zero, zero, zero, zero, hidden, hidden, make_tape(kChunk)};
 }
 
 template <class S>
@@ -83,14 +83,23 @@ void Mlp<S>::forward(const S* theta, const ConstView<S>& x, Tape<S>& tape, Index
     auto z = outputs.block(0, first, out(l), n);
     multiply<S>(weights(theta, l), input(x, tape, l, first, n), z);
     if (last(l)) break;
-    // Whole padded columns: rows past the bias row hold zero, and f(0) = 0.
-    for (Index j = first; j < first + n; ++j) {
-      Eigen::Map<Eigen::Array<S, Eigen::Dynamic, 1>, Eigen::Aligned64> h(outputs.col(j).data(),
-                                                                         outputs.rows());
+    const auto activate = [&](auto h) {
       if (activation_ == Activation::kTanh)
         h = h.tanh();
       else
         h = h.max(static_cast<S>(kLeak) * h);
+    };
+    // Whole padded columns: rows past the bias row hold zero, and f(0) = 0.
+    for (Index j = first; j < first + n; ++j) {
+      S* h = outputs.col(j).data();
+      if (n == 1) {
+        constexpr int kNarrow = kNarrowBytes / sizeof(S);
+        for (Index i = 0; i < outputs.rows(); i += kNarrow)
+          activate(Eigen::Map<Eigen::Array<S, kNarrow, 1>, Eigen::Aligned32>(h + i));
+      } else {
+        using Column = Eigen::Array<S, Eigen::Dynamic, 1>;
+        activate(Eigen::Map<Column, Eigen::Aligned64>(h, outputs.rows()));
+      }
       h[out(l)] = S(1);
     }
   }

@@ -37,6 +37,7 @@ template <class S>
 struct Scratch {
   Matrix<S> a, b, c, d, e;                           // widest layer x kChunk
   std::vector<Matrix<S>> tangents, tangent_outputs;  // one a hidden layer, for the gradient penalty
+  Tape<S> tape;  // kChunk columns; small enough to stay in the caches, as one of a batch is not
 };
 
 template <class S>

@@ -11,8 +11,7 @@ PolicyObjective<S>::PolicyObjective(const PolicyNetwork<S>& network, Team team, 
       team_(team),
       fisher_stride_(fisher_stride),
       theta_old_(Vector<S>::Zero(network.parameters())),
-      old_tape_(network.mlp.make_tape(capacity)),
-      new_tape_(network.mlp.make_tape(capacity)),
+      old_output_(Matrix<S>::Zero(padded(network.mlp.outputs()), capacity)),
       fisher_tape_(network.mlp.make_tape((capacity + fisher_stride - 1) / fisher_stride)),
       fisher_x_(Matrix<S>::Zero(padded(network.mlp.inputs() + 1),
                                 (capacity + fisher_stride - 1) / fisher_stride)),
@@ -36,49 +35,45 @@ void PolicyObjective<S>::bind(const Vector<S>& theta_old, const Matrix<S>& x,
   advantages_ = &advantages;
   n_ = n;
   entropy_weight_ = entropy_weight;
+  compute_gradient();
+
   const auto& mlp = network_.mlp;
-  const S* theta = theta_old_.data();
   const Index rows = mlp.inputs() + 1;
-
-  for_each_chunk(team_, n, [&](int, Index first, Index count) {
-    mlp.forward(theta, x.block(0, first, rows, count), old_tape_, first);
-    network_.distribution.log_prob(mlp.output(old_tape_, first, count), network_.log_std(theta),
-                                   actions.block(0, first, actions.rows(), count), nullptr,
-                                   old_log_prob_.segment(first, count));
-  });
-
   fisher_n_ = (n + fisher_stride_ - 1) / fisher_stride_;
   for_each_chunk(team_, fisher_n_, [&](int, Index first, Index count) {
     for (Index j = first; j < first + count; ++j)
       fisher_x_.col(j).head(rows) = x.col(j * fisher_stride_).head(rows);
-    mlp.forward(theta, fisher_x_.block(0, first, rows, count), fisher_tape_, first);
+    mlp.forward(theta_old_.data(), fisher_x_.block(0, first, rows, count), fisher_tape_, first);
   });
 }
 
 template <class S>
-const Vector<S>& PolicyObjective<S>::gradient() {
+void PolicyObjective<S>::compute_gradient() {
   const auto& mlp = network_.mlp;
   const S* theta = theta_old_.data();
   const S scale = S(1) / static_cast<S>(n_);
   gradient_ = parameter_sums_.sum(team_, n_, [&](Index, int w, Index first, Index count, S* out) {
     Worker& worker = workers_[static_cast<std::size_t>(w)];
     const auto x = x_->block(0, first, mlp.inputs() + 1, count);
-    const auto output = mlp.output(old_tape_, first, count);
+    mlp.forward(theta, x, worker.scratch.tape, 0);
+    View<S> output = old_output_.block(0, first, mlp.outputs(), count);
+    output = mlp.output(worker.scratch.tape, 0, count);
+    const auto actions = actions_->block(0, first, actions_->rows(), count);
+    network_.distribution.log_prob(output, network_.log_std(theta), actions, nullptr,
+                                   old_log_prob_.segment(first, count));
     View<S> adjoint = worker.adjoint.block(0, 0, mlp.outputs(), count);
     S* d_log_std = network_.log_std(out);
     std::fill_n(d_log_std, network_.distribution.log_stds(), S(0));
     // At theta_old the ratio is 1 and its gradient that of log pi.
     auto weight = worker.row.head(count);
     weight = scale * advantages_->segment(first, count).transpose();
-    network_.distribution.score(output, network_.log_std(theta),
-                                actions_->block(0, first, actions_->rows(), count), nullptr, weight,
-                                adjoint, d_log_std);
+    network_.distribution.score(output, network_.log_std(theta), actions, nullptr, weight, adjoint,
+                                d_log_std);
     if (entropy_weight_ != S(0))
       network_.distribution.add_entropy_gradient(output, scale * entropy_weight_, adjoint,
                                                  d_log_std);
-    mlp.backward(theta, x, old_tape_, first, adjoint, out, worker.scratch);
+    mlp.backward(theta, x, worker.scratch.tape, 0, adjoint, out, worker.scratch);
   });
-  return gradient_;
 }
 
 template <class S>
@@ -109,8 +104,9 @@ typename PolicyObjective<S>::Value PolicyObjective<S>::evaluate(const Vector<S>&
   const auto total =
       scalar_sums_.sum(team_, n_, [&](Index, int w, Index first, Index count, double* out) {
         Worker& worker = workers_[static_cast<std::size_t>(w)];
-        mlp.forward(theta.data(), x_->block(0, first, mlp.inputs() + 1, count), new_tape_, first);
-        const auto output = mlp.output(new_tape_, first, count);
+        Tape<S>& tape = worker.scratch.tape;
+        mlp.forward(theta.data(), x_->block(0, first, mlp.inputs() + 1, count), tape, 0);
+        const auto output = mlp.output(tape, 0, count);
         auto row = worker.row.head(count);
         distribution.log_prob(output, network_.log_std(theta.data()),
                               actions_->block(0, first, actions_->rows(), count), nullptr, row);
@@ -118,8 +114,9 @@ typename PolicyObjective<S>::Value PolicyObjective<S>::evaluate(const Vector<S>&
         for (Index j = 0; j < count; ++j)
           out[0] += static_cast<double>(std::exp(row[j] - old_log_prob_[first + j]) *
                                         (*advantages_)[first + j]);
-        distribution.kl(mlp.output(old_tape_, first, count), network_.log_std(theta_old_.data()),
-                        output, network_.log_std(theta.data()), row);
+        distribution.kl(old_output_.block(0, first, mlp.outputs(), count),
+                        network_.log_std(theta_old_.data()), output, network_.log_std(theta.data()),
+                        row);
         out[1] = 0;
         for (Index j = 0; j < count; ++j) out[1] += static_cast<double>(row[j]);
         out[2] = distribution.entropy(output, network_.log_std(theta.data()));
@@ -134,8 +131,9 @@ typename PolicyObjective<S>::Value PolicyObjective<S>::evaluate_old() {
         out[0] = 0;
         for (Index j = 0; j < count; ++j) out[0] += static_cast<double>((*advantages_)[first + j]);
         out[1] = 0;
-        out[2] = network_.distribution.entropy(network_.mlp.output(old_tape_, first, count),
-                                               network_.log_std(theta_old_.data()));
+        out[2] = network_.distribution.entropy(
+            old_output_.block(0, first, network_.mlp.outputs(), count),
+            network_.log_std(theta_old_.data()));
       });
   return mean(total);
 }

@@ -22,13 +22,14 @@ class PolicyObjective {
   // For batches of up to `capacity` samples; the Fisher matrix uses every `fisher_stride`-th.
   PolicyObjective(const PolicyNetwork<S>& network, Team team, Index capacity, int fisher_stride);
 
-  // Fixes theta_old and the batch. x: (observations + 1) x >= n with a last row of ones; actions:
-  // as sampled; advantages: n. All must outlive the use of this object until the next bind.
+  // Fixes theta_old and the batch, and computes the gradient there. x: (observations + 1) x >= n
+  // with a last row of ones; actions: as sampled; advantages: n. All must outlive the use of this
+  // object until the next bind.
   void bind(const Vector<S>& theta_old, const Matrix<S>& x, const Matrix<S>& actions,
             const Vector<S>& advantages, Index n, S entropy_weight);
 
   // dL/dtheta at theta_old.
-  const Vector<S>& gradient();
+  const Vector<S>& gradient() const { return gradient_; }
   // F v.
   void fisher_vector_product(const Vector<S>& v, Vector<S>& result);
 
@@ -42,6 +43,7 @@ class PolicyObjective {
   Value evaluate_old();
 
  private:
+  void compute_gradient();
   // Of the batch's sums of surrogate, KL and entropy.
   Value mean(const Eigen::Map<Vector<double>>& total) const;
 
@@ -54,7 +56,8 @@ class PolicyObjective {
   const Matrix<S>* actions_ = nullptr;
   const Vector<S>* advantages_ = nullptr;
   Vector<S> theta_old_;
-  Tape<S> old_tape_, new_tape_, fisher_tape_;
+  Matrix<S> old_output_;
+  Tape<S> fisher_tape_;
   Matrix<S> fisher_x_;
   RowVector<S> old_log_prob_;
   ChunkSums<S> parameter_sums_;

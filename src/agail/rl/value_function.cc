@@ -15,7 +15,6 @@ ValueFunction::ValueFunction(int observation_dim, const ValueSettings& settings,
       mlp_(layer_sizes(observation_dim, settings.hidden, 1), Activation::kTanh),
       theta_(Vector<float>::Zero(mlp_.parameters())),
       adam_(mlp_.parameters()),
-      tape_(mlp_.make_tape(std::max<Index>(capacity, settings.minibatch))),
       sums_(mlp_.parameters(), settings.minibatch),
       minibatch_x_(Matrix<float>::Zero(padded(mlp_.inputs() + 1), settings.minibatch)),
       minibatch_target_(RowVector<float>::Zero(settings.minibatch)) {
@@ -27,10 +26,11 @@ ValueFunction::ValueFunction(int observation_dim, const ValueSettings& settings,
 }
 
 void ValueFunction::predict(const Matrix<float>& x, Index n, Vector<float>& values) {
-  for_each_chunk(team_, n, [&](int, Index first, Index count) {
-    mlp_.forward(theta_.data(), x.block(0, first, mlp_.inputs() + 1, count), tape_, first);
+  for_each_chunk(team_, n, [&](int w, Index first, Index count) {
+    Tape<float>& tape = workers_[static_cast<std::size_t>(w)].scratch.tape;
+    mlp_.forward(theta_.data(), x.block(0, first, mlp_.inputs() + 1, count), tape, 0);
     values.segment(first, count) =
-        (mlp_.output(tape_, first, count).row(0).array() * static_cast<float>(std_) +
+        (mlp_.output(tape, 0, count).row(0).array() * static_cast<float>(std_) +
          static_cast<float>(mean_))
             .transpose();
   });
@@ -76,11 +76,12 @@ void ValueFunction::fit(const Matrix<float>& x, const Vector<float>& targets, In
                   (targets[from] - static_cast<float>(mean_)) / static_cast<float>(std_);
             }
             const auto columns = minibatch_x_.block(0, first, rows, count);
-            mlp_.forward(theta_.data(), columns, tape_, first);
+            Tape<float>& tape = worker.scratch.tape;
+            mlp_.forward(theta_.data(), columns, tape, 0);
             View<float> adjoint = worker.adjoint.leftCols(count);
-            adjoint = (mlp_.output(tape_, first, count) - minibatch_target_.segment(first, count)) /
+            adjoint = (mlp_.output(tape, 0, count) - minibatch_target_.segment(first, count)) /
                       static_cast<float>(size);
-            mlp_.backward(theta_.data(), columns, tape_, first, adjoint, out, worker.scratch);
+            mlp_.backward(theta_.data(), columns, tape, 0, adjoint, out, worker.scratch);
           });
       adam_.descend(team_.pool(), theta_, gradient, settings_.learning_rate);
     }

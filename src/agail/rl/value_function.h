@@ -35,7 +35,6 @@ class ValueFunction {
   Vector<float> theta_;
   Adam<float> adam_;
   double mean_ = 0, std_ = 1, count_ = 0, second_moment_ = 0;
-  Tape<float> tape_;
   ChunkSums<float> sums_;
   Matrix<float> minibatch_x_;
   RowVector<float> minibatch_target_;
