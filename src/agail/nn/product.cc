@@ -28,9 +28,8 @@ template <class S>
 inline constexpr int kWidth = Eigen::internal::packet_traits<S>::size;
 
 // For products with a single column: an action, between two steps of the physics. Multiplying
-// 512-bit packets makes many processors lower the core's clock for about a millisecond, in which
-// the physics would be up to a tenth slower. Every sum is added in the same order with either
-// packet.
+// 512-bit packets makes many processors lower the core's clock for about a millisecond, and slows
+// the physics. Every sum is added in the same order with either packet.
 template <class S>
 using Narrow =
     std::conditional_t<(sizeof(Packet<S>) > kNarrowBytes),
@@ -202,11 +201,11 @@ void multiply_any(const S* a, Index a_column, Index m, Index k, Right<S> b, Inde
 // Few rows do not fill a packet: the products of a network's last layer, of which there are several
 // for each of the others.
 
-// Each is kWidth sums side by side, halved until one is left, whatever the packet V that holds
-// them.
+// kWidth partial sums of a dot product take this many packets V.
 template <class V, class S = Scalar<V>>
 inline constexpr int kParts = kWidth<S> / kLanes<V>;
 
+// Their sum: halves are added until one number is left, in one order whatever V is.
 template <class V, class S = Scalar<V>>
 S total(const V (&parts)[kParts<V>]) {
   if constexpr (kParts<V> == 2)
