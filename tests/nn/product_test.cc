@@ -72,11 +72,13 @@ void check_shapes() {
 TEST(Product, EqualsEigensForAllShapesInSinglePrecision) { check_shapes<float>(); }
 TEST(Product, EqualsEigensForAllShapesInDoublePrecision) { check_shapes<double>(); }
 
-// A column alone is computed with narrower packets; nobody may see that.
+// A column alone is computed with narrower packets; nobody may see that. Not of tiny factors, which
+// are left to Eigen.
 template <class S>
 void check_column_alone() {
   for (const Index m : {1, 3, 6, 15, 16, 17, 31, 64, 100, 130, 300})
     for (const Index k : {1, 12, 16, 101, 300}) {
+      if (m < 16 && k < 16) continue;
       const Matrix<S> a = Matrix<S>::Random(m, k);
       const Matrix<S> b = Matrix<S>::Random(k, 13);
       for (const bool add : {false, true}) {
