@@ -113,7 +113,7 @@ Guide::Guide(const DemoData& demos, const ActionSpace& action, const GuideSettin
   network_.initialise(theta_.data(), random);
   for (int i = 0; i < team.pool().threads(); ++i) {
     scratch_.push_back(network_.mlp.make_scratch());
-    chunk_x_.push_back(Matrix<float>::Zero(x_.rows(), kChunk));
+    chunk_x_.emplace_back(Matrix<float>::Zero(x_.rows(), kChunk));
   }
   normalizer_.update(team.pool(), demos.states);
 
