@@ -32,6 +32,21 @@ TEST(Adam, EqualsThePlainAlgorithm) {
   EXPECT_LE(reference::relative_error(theta, expected), 1e-12);
 }
 
+TEST(Adam, SameBitsInParts) {
+  constexpr Index n = 50;
+  const Vector<float> gradient = reference::normal_vector(n, 2).cast<float>();
+  Vector<float> whole = reference::normal_vector(n, 1).cast<float>(), parts = whole;
+  Adam<float> together(n), apart(n);
+  ThreadPool pool(1);
+  for (int i = 0; i < 3; ++i) {
+    together.descend(pool, whole, gradient, 1e-2);
+    const auto step = apart.begin_step(1e-2);
+    apart.descend(step, parts.tail(34), gradient.tail(34), 16);
+    apart.descend(step, parts.head(16), gradient.head(16), 0);
+  }
+  EXPECT_TRUE(reference::same_bits(whole, parts));
+}
+
 TEST(Adam, ContinuesFromAnArchive) {
   const Vector<float> start = reference::normal_vector(40, 1).cast<float>();
   const Vector<float> gradient = reference::normal_vector(40, 2).cast<float>();
@@ -71,6 +86,23 @@ TEST(ChunkSums, SameBitsForAnyNumberOfThreads) {
 }
 
 // A sum along the tree is ((c0 + c1) + (c2 + c3)) + c4, which other orders do not give.
+TEST(ChunkSums, HandsOutEachSumOnce) {
+  constexpr Index values = 3000;
+  const auto body = [](Index chunk, int, Index, Index, float* out) {
+    for (Index i = 0; i < values; ++i) out[i] = static_cast<float>(i * (chunk + 1));
+  };
+  for (const int threads : {1, 3}) {
+    ThreadPool pool(threads);
+    ChunkSums<float> sums(values, 2 * kChunk);
+    Vector<float> used = Vector<float>::Zero(values);
+    const Vector<float> total =
+        sums.sum(pool, 2 * kChunk, body,
+                 [&](Index first, const auto& some) { used.segment(first, some.size()) += some; });
+    EXPECT_EQ(used, total);
+    EXPECT_EQ(total[7], 7.0F * (1 + 2));
+  }
+}
+
 TEST(ChunkSums, AddsAlongTheBinaryTree) {
   ThreadPool pool(2);
   const std::vector<float> c{1e8F, 3, -1e8F, 5, 7};

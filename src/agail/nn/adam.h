@@ -19,22 +19,35 @@ class Adam {
   // theta -= learning rate * m^ / (sqrt(v^) + epsilon)
   void descend(ThreadPool& pool, Eigen::Ref<Vector<S>> theta,
                const Eigen::Ref<const Vector<S>>& gradient, double learning_rate) {
+    const Step step = begin_step(learning_rate);
+    constexpr Index kBlock = 1024;  // one pass over memory
+    pool.run_blocks(theta.size(), kBlock, [&](Index i, Index n) {
+      descend(step, theta.segment(i, n), gradient.segment(i, n), i);
+    });
+  }
+
+  // The same in parts: begin_step() once, then descend() for all parameters, some at a time, those
+  // from `first` on.
+  struct Step {
+    S rate, epsilon;
+  };
+  Step begin_step(double learning_rate) {
     ++step_;
     const double correction1 = 1 - std::pow(kBeta1, static_cast<double>(step_));
     const double correction2 = std::sqrt(1 - std::pow(kBeta2, static_cast<double>(step_)));
-    const auto rate = static_cast<S>(learning_rate * correction2 / correction1);
-    const auto epsilon = static_cast<S>(kEpsilon * correction2);
+    return {static_cast<S>(learning_rate * correction2 / correction1),
+            static_cast<S>(kEpsilon * correction2)};
+  }
+  void descend(const Step& step, Eigen::Ref<Vector<S>> theta,
+               const Eigen::Ref<const Vector<S>>& gradient, Index first) {
     constexpr auto b1 = static_cast<S>(kBeta1);
     constexpr auto b2 = static_cast<S>(kBeta2);
-    constexpr Index kBlock = 1024;  // one pass over memory
-    pool.run_blocks(theta.size(), kBlock, [&](Index i, Index n) {
-      auto m = first_.segment(i, n).array();
-      auto v = second_.segment(i, n).array();
-      const auto g = gradient.segment(i, n).array();
-      m = b1 * m + (S(1) - b1) * g;
-      v = b2 * v + (S(1) - b2) * g.square();
-      theta.segment(i, n).array() -= rate * m / (v.sqrt() + epsilon);
-    });
+    auto m = first_.segment(first, theta.size()).array();
+    auto v = second_.segment(first, theta.size()).array();
+    const auto g = gradient.array();
+    m = b1 * m + (S(1) - b1) * g;
+    v = b2 * v + (S(1) - b2) * g.square();
+    theta.array() -= step.rate * m / (v.sqrt() + step.epsilon);
   }
 
   void archive(Archive& a) requires std::same_as<S, float> {

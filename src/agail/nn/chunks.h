@@ -44,6 +44,13 @@ class ChunkSums {
   // ranks get the sums.
   template <class Body>
   Eigen::Map<Vector<S>> sum(Team team, Index samples, Body&& body) {
+    return sum(team, samples, body, [](Index, const auto&) {});
+  }
+
+  // The same, and calls use(first, sums) for blocks of the sums, those from `first` on, as soon as
+  // they are there: in the caches of the thread that added them.
+  template <class Body, class Use>
+  Eigen::Map<Vector<S>> sum(Team team, Index samples, Body&& body, Use&& use) {
     const Index chunks = chunk_count(samples);
     const Share own = team.share(chunks);
     ThreadPool& pool = team.pool();
@@ -53,11 +60,17 @@ class ChunkSums {
       body(chunk, worker, first, std::min(kChunk, samples - first), partial_.col(chunk).data());
     });
     constexpr Index kRows = 1024;  // at a time, so that they stay in the first-level cache
+    const auto use_rows = [&](Index first, Index rows) {
+      use(first, partial_.col(0).segment(first, rows));
+    };
     pool.run_blocks(values_, kRows, [&](Index first, Index rows) {
       add_along_tree(partial_, chunks, own, first, rows);
+      if (!team.spreads(chunks)) use_rows(first, rows);
     });
-    if (team.spreads(chunks))
+    if (team.spreads(chunks)) {
       add_along_ranks(team.communicator(), chunks, values_, partial_, message_);
+      pool.run_blocks(values_, kRows, use_rows);
+    }
     return {partial_.data(), values_};
   }
 

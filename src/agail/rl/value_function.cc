@@ -15,14 +15,14 @@ ValueFunction::ValueFunction(int observation_dim, const ValueSettings& settings,
       mlp_(layer_sizes(observation_dim, settings.hidden, 1), Activation::kTanh),
       theta_(Vector<float>::Zero(mlp_.parameters())),
       adam_(mlp_.parameters()),
-      sums_(mlp_.parameters(), settings.minibatch),
-      minibatch_x_(Matrix<float>::Zero(padded(mlp_.inputs() + 1), settings.minibatch)),
-      minibatch_target_(RowVector<float>::Zero(settings.minibatch)) {
+      sums_(mlp_.parameters(), settings.minibatch) {
   RandomStream random(seed, Purpose::kInitialise, 1);
   mlp_.initialise(theta_.data(), random, 0.1);
   order_.reserve(static_cast<std::size_t>(capacity));
   for (int i = 0; i < team.pool().threads(); ++i)
-    workers_.push_back({mlp_.make_scratch(), Matrix<float>::Zero(1, kChunk)});
+    workers_.push_back({mlp_.make_scratch(), Matrix<float>::Zero(1, kChunk),
+                        Matrix<float>::Zero(padded(mlp_.inputs() + 1), kChunk),
+                        RowVector<float>::Zero(kChunk)});
 }
 
 void ValueFunction::predict(const Matrix<float>& x, Index n, Vector<float>& values) {
@@ -66,24 +66,25 @@ void ValueFunction::fit(const Matrix<float>& x, const Vector<float>& targets, In
     shuffle(order_, random);
     for (Index start = 0; start < n; start += settings_.minibatch) {
       const Index size = std::min<Index>(settings_.minibatch, n - start);
-      const auto gradient =
-          sums_.sum(team_, size, [&](Index, int w, Index first, Index count, float* out) {
-            Worker& worker = workers_[static_cast<std::size_t>(w)];
-            for (Index j = first; j < first + count; ++j) {
-              const Index from = order_[static_cast<std::size_t>(start + j)];
-              minibatch_x_.col(j).head(rows) = x.col(from).head(rows);
-              minibatch_target_[j] =
-                  (targets[from] - static_cast<float>(mean_)) / static_cast<float>(std_);
-            }
-            const auto columns = minibatch_x_.block(0, first, rows, count);
-            Tape<float>& tape = worker.scratch.tape;
-            mlp_.forward(theta_.data(), columns, tape, 0);
-            View<float> adjoint = worker.adjoint.leftCols(count);
-            adjoint = (mlp_.output(tape, 0, count) - minibatch_target_.segment(first, count)) /
-                      static_cast<float>(size);
-            mlp_.backward(theta_.data(), columns, tape, 0, adjoint, out, worker.scratch);
-          });
-      adam_.descend(team_.pool(), theta_, gradient, settings_.learning_rate);
+      const auto learn_chunk = [&](Index, int w, Index first, Index count, float* out) {
+        Worker& worker = workers_[static_cast<std::size_t>(w)];
+        Tape<float>& tape = worker.scratch.tape;
+        View<float> adjoint = worker.adjoint.leftCols(count);
+        for (Index j = 0; j < count; ++j) {
+          const Index from = order_[static_cast<std::size_t>(start + first + j)];
+          worker.x.col(j).head(rows) = x.col(from).head(rows);
+          worker.target[j] = (targets[from] - static_cast<float>(mean_)) / static_cast<float>(std_);
+        }
+        const auto columns = worker.x.block(0, 0, rows, count);
+        mlp_.forward(theta_.data(), columns, tape, 0);
+        adjoint =
+            (mlp_.output(tape, 0, count) - worker.target.head(count)) / static_cast<float>(size);
+        mlp_.backward(theta_.data(), columns, tape, 0, adjoint, out, worker.scratch);
+      };
+      const auto step = adam_.begin_step(settings_.learning_rate);
+      sums_.sum(team_, size, learn_chunk, [&](Index first, const auto& gradient) {
+        adam_.descend(step, theta_.segment(first, gradient.size()), gradient, first);
+      });
     }
   }
 }

@@ -36,12 +36,11 @@ class ValueFunction {
   Adam<float> adam_;
   double mean_ = 0, std_ = 1, count_ = 0, second_moment_ = 0;
   ChunkSums<float> sums_;
-  Matrix<float> minibatch_x_;
-  RowVector<float> minibatch_target_;
   std::vector<Index> order_;
   struct Worker {
     Scratch<float> scratch;
-    Matrix<float> adjoint;
+    Matrix<float> adjoint, x;
+    RowVector<float> target;
   };
   std::vector<Worker> workers_;
 };
