@@ -166,8 +166,10 @@ def markdown_table(table: list[dict], ours: dict, environments: list[str]) -> st
     """The paper's statistic, ours and in brackets the paper's; an environment of fewer than six seeds says so."""
 
     def heading(environment: str) -> str:
-        seeds = min(len(ours.get((environment, label), ((), ()))[1]) for label in COLOURS)
-        return environment if seeds == 6 else f"{environment}, {seeds} seeds"
+        seeds = {len(curves) for (e, _), (_, curves) in ours.items() if e == environment}
+        if seeds == {6}:
+            return environment
+        return f"{environment}, {' to '.join(map(str, sorted({min(seeds), max(seeds)})))} seeds"
 
     def cell(environment: str, label: str) -> str:
         for row in table:
