@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -232,6 +233,39 @@ def test_shared_experts(agail, grid, tmp_path):
     assert not (tmp_path / "experts").exists()
     ours = results(tmp_path)
     assert ours and all(results(grid)[name] == ours[name] for name in ours)
+
+
+def published(grid, out, without):
+    """What a repository keeps of a grid: what it is and its records, here all but one."""
+    shutil.copytree(grid / "records", out / "records")
+    shutil.copy(grid / "experiment.json", out)
+    (out / "records" / without).unlink(missing_ok=True)
+
+
+@pytest.mark.parametrize("lost", ["none", "CartPole-v0-trpo-1.json"])
+def test_experts_are_trained_for_who_needs_them_only(agail, grid, tmp_path, lost):
+    published(grid, tmp_path, lost)
+    agail(*GRID, "--out", tmp_path)
+    assert not list((tmp_path / "experts/runs").iterdir())
+    assert [run.name for run in (tmp_path / "runs").iterdir()] == [lost[:-5]] * (lost != "none")
+    ours = results(tmp_path)
+    assert ours and all(results(grid)[name] == ours[name] for name in ours)
+
+
+@pytest.mark.parametrize("lost", ["CartPole-v0-agail-75-2.json", "demonstrations/CartPole-v0.json"])
+def test_a_record_of_demonstrations_is_not_the_demonstrations(agail, grid, tmp_path, lost):
+    published(grid, tmp_path, lost)
+    agail(*GRID, "--out", tmp_path)
+    assert_same(tmp_path, grid)
+    assert (tmp_path / "demonstrations/CartPole-v0/missing-75.hdf5").exists()
+
+
+def test_demonstrations_outlive_their_experts(agail, grid, tmp_path):
+    published(grid, tmp_path, "CartPole-v0-agail-75-2.json")
+    shutil.copytree(grid / "demonstrations", tmp_path / "demonstrations")
+    agail(*GRID, "--out", tmp_path)
+    assert not list((tmp_path / "experts/runs").iterdir())
+    assert (tmp_path / "table.csv").read_bytes() == (grid / "table.csv").read_bytes()
 
 
 def wait_for(condition, process):

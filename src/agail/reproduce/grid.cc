@@ -46,19 +46,28 @@ class GridBuilder {
     };
     std::vector<std::string> environments;  // that need demonstrations
     for (const GridRun& run : runs)
-      if (run.cell.missing && std::find(environments.begin(), environments.end(),
-                                        run.cell.environment) == environments.end())
+      if (needs_demonstrations(run) && std::find(environments.begin(), environments.end(),
+                                                 run.cell.environment) == environments.end())
         environments.push_back(run.cell.environment);
     std::stable_sort(environments.begin(), environments.end(),
                      [&](const std::string& a, const std::string& b) { return cost(a) > cost(b); });
     for (const std::string& environment : environments)
-      for (const std::uint64_t seed : kExpertSeeds) add_expert(environment, seed);
+      if (!is_done(demonstrations_job(environment)))
+        for (const std::uint64_t seed : kExpertSeeds) add_expert(environment, seed);
     for (const std::string& environment : environments) add_demonstrations(environment);
     for (const GridRun& run : runs) add_run(run);
     return std::move(grid_);
   }
 
  private:
+  static fs::path record_file(const fs::path& folder, const std::string& id) {
+    return folder / "records" / (id + ".json");
+  }
+
+  fs::path demonstrations_record(const std::string& environment) const {
+    return record_file(out_, "demonstrations/" + environment);
+  }
+
   std::size_t add(Job job, std::optional<Cell> cell = {}) {
     grid_.jobs.push_back(std::move(job));
     grid_.cells.push_back(std::move(cell));
@@ -86,9 +95,9 @@ class GridBuilder {
       const fs::path& folder, const std::string& id, std::string title,
       const std::string& environment, const Settings& settings, std::vector<std::string> arguments,
       std::function<void(const fs::path& record, const fs::path& run)> write_record) {
-    const fs::path run = folder / "runs" / id, record = folder / "records" / (id + ".json");
+    const fs::path run = folder / "runs" / id, record = record_file(folder, id);
     return {.title = std::move(title),
-            .result = record,
+            .results = {record},
             .lock = folder / "locks" / id,
             .log = folder / "logs" / (id + ".log"),
             .needs = {},
@@ -113,31 +122,40 @@ class GridBuilder {
         })));
   }
 
+  // A run that has left its record needs none; of its environment's, the tables need the record.
+  bool needs_demonstrations(const GridRun& run) const {
+    return run.cell.missing && !(is_there(record_file(out_, run.id())) &&
+                                 is_there(demonstrations_record(run.cell.environment)));
+  }
+
   void add_demonstrations(const std::string& environment) {
-    DemonstrationPlan plan{environment,
-                           experiment_.demonstrations(),
-                           {},
-                           {},
-                           out_ / "demonstrations" / environment,
-                           out_ / "records" / "demonstrations" / (environment + ".json")};
+    Job job = demonstrations_job(environment);
+    job.needs = expert_jobs_[environment];
+    demonstration_jobs_[environment] = add(std::move(job));
+  }
+
+  Job demonstrations_job(const std::string& environment) const {
+    DemonstrationPlan plan{
+        environment, experiment_.demonstrations(),          {},
+        {},          out_ / "demonstrations" / environment, demonstrations_record(environment)};
     for (const std::uint64_t seed : kExpertSeeds) {
       const std::string id = environment + "-" + std::to_string(seed);
-      plan.candidate_records.push_back(experts_ / "records" / (id + ".json"));
+      plan.candidate_records.push_back(record_file(experts_, id));
       plan.candidate_runs.push_back(experts_ / "runs" / id);
     }
-    demonstration_jobs_[environment] =
-        add({.title = environment + " demonstrations",
-             .result = plan.record,
-             .lock = out_ / "locks" / ("demonstrations-" + environment),
-             .log = out_ / "logs" / ("demonstrations-" + environment + ".log"),
-             .needs = expert_jobs_[environment],
-             .steps = {[plan] {
-               make_demonstrations(plan);
-               return 0;
-             }},
-             .cost = 1,
-             .progress = {},
-             .timesteps = 0});
+    return {.title = environment + " demonstrations",
+            // A record alone may have been published, without what it describes.
+            .results = {demonstrations_file(plan.folder, 1), plan.record},
+            .lock = out_ / "locks" / ("demonstrations-" + environment),
+            .log = out_ / "logs" / ("demonstrations-" + environment + ".log"),
+            .needs = {},
+            .steps = {[plan] {
+              make_demonstrations(plan);
+              return 0;
+            }},
+            .cost = 1,
+            .progress = {},
+            .timesteps = 0};
   }
 
   void add_run(const GridRun& run) {
@@ -151,7 +169,8 @@ class GridBuilder {
       const fs::path demos = out_ / "demonstrations" / environment;
       arguments.insert(arguments.end(),
                        {"--demos", demonstrations_file(demos, *run.cell.missing).string()});
-      needs = {demonstration_jobs_[environment]};
+      if (const auto job = demonstration_jobs_.find(environment); job != demonstration_jobs_.end())
+        needs = {job->second};
     }
     Job job = training_job(
         out_, run.id(), run.title(), environment, settings, arguments,

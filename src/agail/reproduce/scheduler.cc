@@ -88,7 +88,7 @@ class Scheduler {
   }
 
   bool note_if_done(std::size_t i) {
-    if (!std::filesystem::exists(jobs_[i].result)) return false;
+    if (!is_done(jobs_[i])) return false;
     status_[i] = {JobState::kDone, true, 1};
     return true;
   }
@@ -107,7 +107,7 @@ class Scheduler {
         start_step(running);
         continue;
       }
-      const bool done = good && std::filesystem::exists(job.result);
+      const bool done = good && is_done(job);
       status_[running.job] = {done ? JobState::kDone : JobState::kFailed, false, done ? 1.0 : 0.0};
       if (!done) observer_.failed(job, good ? "left no result" : how_it_ended(ended));
       running_.erase(running_.begin() + static_cast<std::ptrdiff_t>(r));

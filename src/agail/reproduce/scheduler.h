@@ -38,7 +38,7 @@ struct JobsOutcome {
 };
 
 // Takes jobs in their order as soon as what they need is done, `at_once` at a time. Jobs whose
-// result exists are done; one that another process holds is waited for. A job that fails does not
+// results exist are done; one that another process holds is waited for. A job that fails does not
 // stop the others. On SIGINT or SIGTERM the children are told to stop (SIGINT) and waited for. The
 // caller must have one thread only.
 JobsOutcome run_jobs(std::span<const Job> jobs, int at_once, JobObserver& observer);
