@@ -5,16 +5,14 @@
     benchmarks/ablation.py --envs CartPole-v0 --seeds 0 1 2
     benchmarks/ablation.py --only-tables      from what has been run
 
-Each part is a grid of `agail reproduce table1` in WORK/<part> (default runs/ablation) and goes on where it was stopped. The
+Each part is a grid of `agail reproduce table1` in results/table1/ablation/<part>, which goes on from the records there. The
 full method is the same cell of the experiment itself: FULL (default results/table1/default), with its experts in EXPERTS
-(default FULL/experts), which are made again if they are not there. Leaves what the runs said in results/table1/ablation:
-<part>/records, table.csv (the columns of `agail reproduce`, after the part that was off) and table.md; fills the table in
-docs/results.md.
+(default FULL/experts), which are trained again if a run needs them and they are not there. Writes table.csv (the columns of
+`agail reproduce`, after the part that was off) and table.md beside the parts; fills the table in docs/results.md.
 """
 
 import argparse
 import csv
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -32,9 +30,15 @@ OFF = {
 FULL = "none"
 
 
+def reproduce(part: str, *arguments: str | Path) -> None:
+    command = [AGAIL, "reproduce", "table1", "--out", RESULTS / part, *arguments]
+    done = subprocess.run(command, check=False)
+    if done.returncode != 0:
+        sys.exit(done.returncode)
+
+
 def run(part: str, setting: str, options: argparse.Namespace) -> None:
-    command = [AGAIL, "reproduce", "table1", "--out", options.work / part]
-    command += ["--experts", options.experts or options.full / "experts"]
+    command = ["--experts", options.experts or options.full / "experts"]
     command += ["--methods", "agail", "--missing", MISSING, "--set", setting]
     if options.envs:
         command += ["--envs", *options.envs]
@@ -43,17 +47,7 @@ def run(part: str, setting: str, options: argparse.Namespace) -> None:
     if options.jobs:
         command += ["--jobs", str(options.jobs)]
     print(f"without {part}", flush=True)
-    done = subprocess.run(command, check=False)
-    if done.returncode != 0:
-        sys.exit(done.returncode)
-
-
-def publish(part: str, folder: Path) -> list[dict]:
-    """Keeps the records of a part; its rows of the table."""
-    records = RESULTS / part / "records"
-    shutil.copytree(folder / "records", records, dirs_exist_ok=True)
-    shutil.copy(folder / "experiment.json", RESULTS / part)
-    return rows(part, folder)
+    reproduce(part, *command)
 
 
 def rows(part: str, folder: Path) -> list[dict]:
@@ -81,10 +75,21 @@ def markdown(table: list[dict]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def heading(environment: str) -> str:
+    """With the seeds of the parts if there are fewer than six."""
+    seeds = {len(list((RESULTS / part / "records").glob(f"{environment}-*"))) for part in OFF}
+    if seeds == {6}:
+        return environment
+    return f"{environment}, {' to '.join(map(str, sorted({min(seeds), max(seeds)})))} seeds"
+
+
 def overview(table: list[dict]) -> str:
     """For docs/results.md: what is off by row, the environments on which it can tell by column."""
-    environments = ["Hopper-v4", "Walker2d-v4"]
-    lines = [f"| off | {' | | | '.join(environments)} | | |", "| --- " * 7 + "|"]
+    environments = ["Hopper-v4", "Walker2d-v4", "Humanoid-v4"]
+    lines = [
+        f"| off | {' | | | '.join(map(heading, environments))} | | |",
+        "| --- " * (1 + 3 * len(environments)) + "|",
+    ]
     cell = {(row["off"], row["environment"]): row for row in table}
     for off in [FULL, *OFF]:
         cells = ["nothing" if off == FULL else off.replace("-", " ")]
@@ -108,7 +113,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--work", type=Path, default=ROOT / "runs/ablation")
     parser.add_argument("--full", type=Path, default=ROOT / "results/table1/default")
     parser.add_argument("--experts", type=Path)
     parser.add_argument("--envs", nargs="+")
@@ -117,16 +121,15 @@ def main() -> None:
     parser.add_argument("--only-tables", action="store_true")
     options = parser.parse_args()
 
-    if not options.only_tables:
-        for part, setting in OFF.items():
-            run(part, setting, options)
     table = rows(FULL, options.full)
-    for part in OFF:
-        if (options.work / part / "table.csv").exists():
-            table += publish(part, options.work / part)
+    for part, setting in OFF.items():
+        if options.only_tables:
+            reproduce(part, "--only-tables")
+        else:
+            run(part, setting, options)
+        table += rows(part, RESULTS / part)
     environments = list(dict.fromkeys(row["environment"] for row in table))
     table.sort(key=lambda row: environments.index(row["environment"]))
-    RESULTS.mkdir(parents=True, exist_ok=True)
     with (RESULTS / "table.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, table[0].keys(), lineterminator="\n")
         writer.writeheader()
