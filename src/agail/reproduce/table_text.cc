@@ -150,15 +150,17 @@ std::string table_csv(std::span<const CellSummary> cells) {
   std::string text =
       "environment,method,missing,paper_mean,paper_standard_error,mean,standard_error,"
       "deterministic_mean,iqm,iqm_low,iqm_high,worst_seed,share_of_expert,steps_to_95\n";
-  const auto pair = [](const std::optional<MeanAndError>& value) {
-    return value ? number(value->mean, 2) + "," + number(value->standard_error, 2) : ",";
+  // More digits than table.md shows, so that who rounds them gets the same.
+  const auto precise = [](double value) { return number(value, 4); };
+  const auto pair = [&](const std::optional<MeanAndError>& value) {
+    return value ? precise(value->mean) + "," + precise(value->standard_error) : ",";
   };
   for (const CellSummary& cell : cells)
     text += cell.cell.environment + "," + cell.cell.method + "," + ratio(cell.cell.missing) + "," +
-            pair(cell.paper) + "," + pair(cell.training) + "," + number(cell.mean(), 2) + "," +
-            number(cell.iqm, 2) + "," + number(cell.iqm_low, 2) + "," + number(cell.iqm_high, 2) +
-            "," + number(cell.worst(), 2) + "," +
-            (cell.share_of_expert() ? number(*cell.share_of_expert(), 4) : "") + "," +
+            pair(cell.paper) + "," + pair(cell.training) + "," + precise(cell.mean()) + "," +
+            precise(cell.iqm) + "," + precise(cell.iqm_low) + "," + precise(cell.iqm_high) + "," +
+            precise(cell.worst()) + "," +
+            (cell.share_of_expert() ? precise(*cell.share_of_expert()) : "") + "," +
             (cell.steps_to_95 ? number(*cell.steps_to_95, 0) : "") + "\n";
   return text;
 }
