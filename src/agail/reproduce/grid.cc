@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <utility>
 
 #include "agail/base/atomic_file.h"
 #include "agail/base/error.h"
@@ -37,10 +38,10 @@ double seconds(const std::string& environment, const Settings& settings) {
 
 class GridBuilder {
  public:
-  GridBuilder(const Experiment& experiment, const fs::path& out, const fs::path& experts)
-      : experiment_(experiment), out_(out), experts_(experts) {}
+  GridBuilder(const Experiment& experiment, fs::path out, fs::path experts)
+      : experiment_(experiment), out_(std::move(out)), experts_(std::move(experts)) {}
 
-  Grid build(std::vector<GridRun> runs) {
+  Grid build(const std::vector<GridRun>& runs) {
     const auto cost = [&](const std::string& environment) {
       return seconds(environment, experiment_.settings(environment));
     };
@@ -93,8 +94,9 @@ class GridBuilder {
   // Trains in runs/<id> of a folder; then `write_record` leaves `record`.
   static Job training_job(
       const fs::path& folder, const std::string& id, std::string title,
-      const std::string& environment, const Settings& settings, std::vector<std::string> arguments,
-      std::function<void(const fs::path& record, const fs::path& run)> write_record) {
+      const std::string& environment, const Settings& settings,
+      const std::vector<std::string>& arguments,
+      const std::function<void(const fs::path& record, const fs::path& run)>& write_record) {
     const fs::path run = folder / "runs" / id, record = record_file(folder, id);
     return {.title = std::move(title),
             .results = {record},
