@@ -80,7 +80,8 @@ def heading(environment: str) -> str:
     seeds = {len(list((RESULTS / part / "records").glob(f"{environment}-*"))) for part in OFF}
     if seeds == {6}:
         return environment
-    return f"{environment}, {' to '.join(map(str, sorted({min(seeds), max(seeds)})))} seeds"
+    few = " to ".join(map(str, sorted({min(seeds), max(seeds)})))
+    return f"{environment}, {few} {'seed' if seeds == {1} else 'seeds'}"
 
 
 def overview(table: list[dict]) -> str:
@@ -100,8 +101,9 @@ def overview(table: list[dict]) -> str:
                 continue
             share = float(row["share_of_expert"])
             worst = share * float(row["worst_seed"]) / float(row["deterministic_mean"])
+            error = float(row["standard_error"])  # 0: a single seed
             cells += [
-                f"{float(row['mean']):,.0f} ± {float(row['standard_error']):.0f}",
+                f"{float(row['mean']):,.0f}" + (f" ± {error:.0f}" if error > 0 else ""),
                 f"{100 * share:.1f} % ({100 * worst:.1f})",
                 f"{float(row['steps_to_95']):,.0f}" if row["steps_to_95"] else "never",
             ]
