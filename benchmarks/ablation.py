@@ -8,7 +8,7 @@
 Each part is a grid of `agail reproduce table1` in results/table1/ablation/<part>, which goes on from the records there. The
 full method is the same cell of the experiment itself: FULL (default results/table1/default), with its experts in EXPERTS
 (default FULL/experts), which are trained again if a run needs them and they are not there. Writes table.csv (the columns of
-`agail reproduce`, after the part that was off) and table.md beside the parts; fills the table in docs/results.md.
+`agail reproduce`, after the part that was off and the number of seeds) and table.md beside the parts; fills the table in docs/results.md.
 """
 
 import argparse
@@ -51,9 +51,13 @@ def run(part: str, setting: str, options: argparse.Namespace) -> None:
 
 
 def rows(part: str, folder: Path) -> list[dict]:
+    def seeds(environment: str) -> int:
+        ratio = round(100 * float(MISSING))
+        return len(list((folder / "records").glob(f"{environment}-agail-{ratio}-*.json")))
+
     with (folder / "table.csv").open() as file:
         return [
-            {"off": part, **row}
+            {"off": part, "seeds": seeds(row["environment"]), **row}
             for row in csv.DictReader(file)
             if row["method"] == "agail" and float(row["missing"]) == float(MISSING)
         ]
@@ -61,13 +65,13 @@ def rows(part: str, folder: Path) -> list[dict]:
 
 def markdown(table: list[dict]) -> str:
     lines = [
-        "| environment | off | training return | deterministic IQM [95 %] | worst seed | of the expert | steps to 95 % |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| environment | off | seeds | training return | deterministic IQM [95 %] | worst seed | of the expert | steps to 95 % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in table:
         steps = f"{float(row['steps_to_95']):,.0f}" if row["steps_to_95"] else "never"
         lines.append(
-            f"| {row['environment']} | {row['off'].replace('-', ' ')} "
+            f"| {row['environment']} | {row['off'].replace('-', ' ')} | {row['seeds']} "
             f"| {float(row['mean']):.1f} ± {float(row['standard_error']):.1f} "
             f"| {float(row['iqm']):.1f} [{float(row['iqm_low']):.1f}, {float(row['iqm_high']):.1f}] "
             f"| {float(row['worst_seed']):.1f} | {float(row['share_of_expert']):.1%} | {steps} |"
@@ -75,23 +79,23 @@ def markdown(table: list[dict]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def heading(environment: str) -> str:
-    """With the seeds of the parts if there are fewer than six."""
-    seeds = {len(list((RESULTS / part / "records").glob(f"{environment}-*"))) for part in OFF}
-    if seeds == {6}:
-        return environment
-    few = " to ".join(map(str, sorted({min(seeds), max(seeds)})))
-    return f"{environment}, {few} {'seed' if seeds == {1} else 'seeds'}"
-
-
 def overview(table: list[dict]) -> str:
     """For docs/results.md: what is off by row, the environments on which it can tell by column."""
     environments = ["Hopper-v4", "Walker2d-v4", "Humanoid-v4"]
+    cell = {(row["off"], row["environment"]): row for row in table}
+
+    def heading(environment: str) -> str:
+        """With the seeds of the parts if there are fewer than six."""
+        seeds = {cell[part, environment]["seeds"] for part in OFF if (part, environment) in cell}
+        if seeds == {6}:
+            return environment
+        few = " to ".join(map(str, sorted({min(seeds), max(seeds)})))
+        return f"{environment}, {few} {'seed' if seeds == {1} else 'seeds'}"
+
     lines = [
         f"| off | {' | | | '.join(map(heading, environments))} | | |",
         "| --- " * (1 + 3 * len(environments)) + "|",
     ]
-    cell = {(row["off"], row["environment"]): row for row in table}
     for off in [FULL, *OFF]:
         cells = ["nothing" if off == FULL else off.replace("-", " ")]
         for environment in environments:
@@ -101,9 +105,9 @@ def overview(table: list[dict]) -> str:
                 continue
             share = float(row["share_of_expert"])
             worst = share * float(row["worst_seed"]) / float(row["deterministic_mean"])
-            error = float(row["standard_error"])  # 0: a single seed
+            error = f" ± {float(row['standard_error']):.0f}" if row["seeds"] > 1 else ""
             cells += [
-                f"{float(row['mean']):,.0f}" + (f" ± {error:.0f}" if error > 0 else ""),
+                f"{float(row['mean']):,.0f}{error}",
                 f"{100 * share:.1f} % ({100 * worst:.1f})",
                 f"{float(row['steps_to_95']):,.0f}" if row["steps_to_95"] else "never",
             ]

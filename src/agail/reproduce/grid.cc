@@ -137,9 +137,12 @@ class GridBuilder {
   }
 
   Job demonstrations_job(const std::string& environment) const {
-    DemonstrationPlan plan{
-        environment, experiment_.demonstrations(),          {},
-        {},          out_ / "demonstrations" / environment, demonstrations_record(environment)};
+    DemonstrationPlan plan{.environment = environment,
+                           .choice = experiment_.demonstrations(),
+                           .candidate_records = {},
+                           .candidate_runs = {},
+                           .folder = out_ / "demonstrations" / environment,
+                           .record = demonstrations_record(environment)};
     for (const std::uint64_t seed : kExpertSeeds) {
       const std::string id = environment + "-" + std::to_string(seed);
       plan.candidate_records.push_back(record_file(experts_, id));
