@@ -8,7 +8,8 @@
 Each part is a grid of `agail reproduce table1` in results/table1/ablation/<part>, which goes on from the records there. The
 full method is the same cell of the experiment itself: FULL (default results/table1/default), with its experts in EXPERTS
 (default FULL/experts), which are trained again if a run needs them and they are not there. Writes table.csv (the columns of
-`agail reproduce`, after the part that was off and the number of seeds) and table.md beside the parts; fills the table in docs/results.md.
+`agail reproduce`, after the part that was off and the number of seeds) and table.md beside the parts; fills the table in
+docs/results.md.
 """
 
 import argparse
@@ -17,7 +18,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from machine import AGAIL, ROOT, fill
+from machine import AGAIL, ROOT, fill, with_seeds
 
 RESULTS = ROOT / "results/table1/ablation"
 MISSING = "0.75"
@@ -38,16 +39,16 @@ def reproduce(part: str, *arguments: str | Path) -> None:
 
 
 def run(part: str, setting: str, options: argparse.Namespace) -> None:
-    command = ["--experts", options.experts or options.full / "experts"]
-    command += ["--methods", "agail", "--missing", MISSING, "--set", setting]
+    arguments = ["--experts", options.experts or options.full / "experts"]
+    arguments += ["--methods", "agail", "--missing", MISSING, "--set", setting]
     if options.envs:
-        command += ["--envs", *options.envs]
+        arguments += ["--envs", *options.envs]
     if options.seeds:
-        command += ["--seeds", *map(str, options.seeds)]
+        arguments += ["--seeds", *map(str, options.seeds)]
     if options.jobs:
-        command += ["--jobs", str(options.jobs)]
+        arguments += ["--jobs", str(options.jobs)]
     print(f"without {part}", flush=True)
-    reproduce(part, *command)
+    reproduce(part, *arguments)
 
 
 def rows(part: str, folder: Path) -> list[dict]:
@@ -85,12 +86,8 @@ def overview(table: list[dict]) -> str:
     cell = {(row["off"], row["environment"]): row for row in table}
 
     def heading(environment: str) -> str:
-        """With the seeds of the parts if there are fewer than six."""
-        seeds = {cell[part, environment]["seeds"] for part in OFF if (part, environment) in cell}
-        if seeds == {6}:
-            return environment
-        few = " to ".join(map(str, sorted({min(seeds), max(seeds)})))
-        return f"{environment}, {few} {'seed' if seeds == {1} else 'seeds'}"
+        parts = [cell[part, environment] for part in OFF if (part, environment) in cell]
+        return with_seeds(environment, {row["seeds"] for row in parts})
 
     lines = [
         f"| off | {' | | | '.join(map(heading, environments))} | | |",

@@ -27,6 +27,14 @@ def fill(page: Path, mark: str, content: str) -> None:
     page.write_text(f"{before}{begin}{content}\n{end}{after}")
 
 
+def with_seeds(environment: str, seeds: set[int]) -> str:
+    """The heading of an environment's column: with the numbers of seeds of its cells unless all have the experiment's six."""
+    if seeds == {6}:
+        return environment
+    few = sorted({min(seeds, default=0), max(seeds, default=0)})
+    return f"{environment}, {' to '.join(map(str, few))} {'seed' if few == [1] else 'seeds'}"
+
+
 class Kept(dict):
     """A dict of JSON values in a file of `folder`, one of each build of agail; put() writes it, whole or not at all."""
 

@@ -21,7 +21,7 @@ import matplotlib
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import numpy as np
-from machine import ROOT, fill
+from machine import ROOT, fill, with_seeds
 
 PAPER = ROOT / "results" / "paper"
 ENVIRONMENTS = {  # ours: the paper's name
@@ -167,9 +167,7 @@ def markdown_table(table: list[dict], ours: dict, environments: list[str]) -> st
 
     def heading(environment: str) -> str:
         seeds = {len(curves) for (e, _), (_, curves) in ours.items() if e == environment}
-        if seeds == {6}:
-            return environment
-        return f"{environment}, {' to '.join(map(str, sorted({min(seeds), max(seeds)})))} seeds"
+        return with_seeds(environment, seeds)
 
     def cell(environment: str, label: str) -> str:
         for row in table:

@@ -133,7 +133,7 @@ class GridBuilder {
   void add_demonstrations(const std::string& environment) {
     Job job = demonstrations_job(environment);
     job.needs = expert_jobs_[environment];
-    demonstration_jobs_[environment] = add(std::move(job));
+    demonstration_jobs_[environment] = {add(std::move(job))};
   }
 
   Job demonstrations_job(const std::string& environment) const {
@@ -174,8 +174,7 @@ class GridBuilder {
       const fs::path demos = out_ / "demonstrations" / environment;
       arguments.insert(arguments.end(),
                        {"--demos", demonstrations_file(demos, *run.cell.missing).string()});
-      if (const auto job = demonstration_jobs_.find(environment); job != demonstration_jobs_.end())
-        needs = {job->second};
+      needs = demonstration_jobs_[environment];
     }
     Job job = training_job(
         out_, run.id(), run.title(), environment, settings, arguments,
@@ -189,8 +188,7 @@ class GridBuilder {
   const Experiment& experiment_;
   fs::path out_, experts_;
   Grid grid_;
-  std::map<std::string, std::vector<std::size_t>> expert_jobs_;
-  std::map<std::string, std::size_t> demonstration_jobs_;
+  std::map<std::string, std::vector<std::size_t>> expert_jobs_, demonstration_jobs_;
 };
 
 // The longest first, then every n-th: each part gets as much of each kind.
