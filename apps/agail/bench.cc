@@ -208,7 +208,8 @@ void add_bench(CLI::App& app, Communicator& communicator) {
   command->add_option("--preset", options->preset, "Default paper");
   command->add_option("--set", options->assignments, "key=value, for any setting")
       ->allow_extra_args(false);
-  command->add_option("--missing", options->missing, "Share of missing actions, default 0.5");
+  command->add_option("--missing", options->missing, "Share of missing actions, default 0.5")
+      ->check(not_empty());
   command
       ->add_option("--demonstrations", options->demonstrations,
                    "Transitions of the demonstrations, default those of 100 episodes")

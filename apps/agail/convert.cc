@@ -1,4 +1,5 @@
 // agail convert: plain arrays to demonstrations.
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -21,26 +22,32 @@ struct Options {
   std::string environment;
 };
 
-StepTable read_table(const std::string& path) {
-  std::vector<std::string> ignored;
+StepTable read_table(const std::string& path, std::vector<std::string>& ignored) {
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension != ".npz" && extension != ".csv")
     throw InputError(path + " is neither a .npz nor a .csv file; save the arrays as one of these");
-  StepTable table = extension == ".npz" ? read_npz(path, ignored) : read_csv(path, ignored);
-  if (!ignored.empty()) {
-    std::cerr << "ignored in " << path << ":";
-    for (const std::string& name : ignored) std::cerr << " " << name;
-    std::cerr << "\n";
-  }
-  return table;
+  return extension == ".npz" ? read_npz(path, ignored) : read_csv(path, ignored);
+}
+
+// The columns or arrays of other names, which may be many.
+void tell_ignored(const std::string& path, const std::vector<std::string>& names) {
+  if (names.empty()) return;
+  const std::size_t shown = std::min<std::size_t>(names.size(), 10);
+  std::string note = "agail: note: ignored in " + path + ": " + names[0];
+  for (std::size_t i = 1; i < shown; ++i) note += ", " + names[i];
+  if (shown < names.size()) note += " and " + std::to_string(names.size() - shown) + " more";
+  std::cerr << one_line(note) << "\n";
 }
 
 void run(const Options& options) {
   if (options.environment.empty())
     throw InputError("--env is empty; give the environment's Gymnasium id, for example Hopper-v5");
+  check_output(options.output);
+  std::vector<std::string> ignored;
   const Demonstrations demonstrations =
-      demonstrations_of(read_table(options.input), options.environment);
+      demonstrations_of(read_table(options.input, ignored), options.environment);
   write_demonstrations(demonstrations, options.output);
+  tell_ignored(options.input, ignored);
   describe_demonstrations(demonstrations, false, std::cout);
 }
 

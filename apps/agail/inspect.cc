@@ -1,13 +1,14 @@
 // agail inspect: a demonstration file, a policy or a run, in words.
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "agail/base/atomic_file.h"
+#include "agail/base/error.h"
 #include "agail/demos/minari_reader.h"
+#include "agail/demos/spaces_json.h"
 #include "agail/train/saved_policy.h"
 #include "commands.h"
 #include "inspect_demos.h"
@@ -34,18 +35,31 @@ ordered_json describe_policy(const SavedPolicy& policy) {
   return result;
 }
 
+ordered_json read_summary(const fs::path& file) {
+  const std::vector<std::uint8_t> bytes = read_file(file);
+  ordered_json summary;
+  try {
+    summary =
+        parse_python_json<ordered_json>(std::string(bytes.begin(), bytes.end()), file.string());
+  } catch (const InputError&) {  // null is no object either
+  }
+  if (!summary.is_object())
+    throw InputError(file.string() +
+                     " is damaged; remove it, and agail train ... --resume writes it again");
+  return summary;
+}
+
 ordered_json describe_run(const fs::path& folder) {
-  std::ifstream file(folder / "summary.json");
+  const fs::path file = folder / "summary.json";
   ordered_json result = {{"kind", "run"}};
-  const ordered_json summary = ordered_json::parse(file, nullptr, false);
-  if (summary.is_discarded()) {
+  if (!is_there(file)) {
     result["finished"] = false;
     result["note"] =
         "no summary.json: the run is under way, or was cut off; agail train ... --resume goes on "
         "with it";
     return result;
   }
-  result.update(summary);
+  result.update(read_summary(file));
   return result;
 }
 

@@ -28,6 +28,7 @@ void run(const Options& options, bool has_dimension) {
   mask.ratio = options.ratio;
   mask.seed = options.seed;
   if (has_dimension) mask.dimension = options.dimension;
+  check_output(options.output);
   Demonstrations demonstrations = read_demonstrations(options.input);
   remove_actions(demonstrations, mask);
   write_demonstrations(demonstrations, options.output);
@@ -47,7 +48,8 @@ void add_mask(CLI::App& app) {
       ->add_option(
           "--missing", options->ratio,
           "Share of the action entries to remove, 0 to 1; what is missing already stays missing")
-      ->required();
+      ->required()
+      ->check(not_empty());
   command
       ->add_option("--out", options->output,
                    "x.hdf5: one file; any other name: a Minari dataset folder")

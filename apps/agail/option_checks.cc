@@ -22,7 +22,7 @@ CLI::Validator whole_number(std::uint64_t low, std::uint64_t high) {
 
 CLI::Validator not_empty() {
   return {[](std::string& text) -> std::string {
-            return text.empty() ? "it is empty; give a name" : "";
+            return text.empty() ? "it is empty; give a value" : "";
           },
           ""};
 }

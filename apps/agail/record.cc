@@ -1,9 +1,7 @@
 // agail record: demonstrations from a policy.
-#include <filesystem>
 #include <iostream>
 #include <memory>
 
-#include "agail/base/atomic_file.h"
 #include "agail/demos/minari_writer.h"
 #include "agail/train/evaluation.h"
 #include "commands.h"
@@ -21,8 +19,8 @@ struct Options {
 };
 
 void run(const Options& options) {
+  check_output(options.out);
   const SavedPolicy policy = SavedPolicy::load(policy_file(options.policy));
-  create_output_folder(std::filesystem::path(options.out).parent_path());
   ThreadPool pool(default_threads());
   const Demonstrations demos =
       record(policy, options.episodes, options.seed, options.stochastic, pool);
@@ -44,7 +42,7 @@ void add_record(CLI::App& app) {
                    "x.hdf5: one file; any other name: a Minari dataset folder")
       ->required()
       ->check(not_empty());
-  command->add_option("--seed", options->seed, "Names the episodes")->check(any_seed());
+  command->add_option("--seed", options->seed, "Names the episodes; default 0")->check(any_seed());
   command->add_flag("--stochastic", options->stochastic,
                     "Sample actions instead of taking the mode");
   command->callback([options] { run(*options); });

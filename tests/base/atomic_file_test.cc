@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <set>
 #include <string>
 
 #include "base/messages.h"
@@ -12,7 +11,9 @@ namespace agail {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::StartsWith;
 using Bytes = std::vector<std::uint8_t>;
 
 TEST(AtomicFile, WritesReplacesAndLeavesNothingElse) {
@@ -50,17 +51,19 @@ TEST(AtomicFile, CreatesOnlyWhatIsNotThere) {
 
 // Process ids are equal in two containers that share a file system.
 TEST(AtomicFile, NoTemporaryNameTwice) {
+  EXPECT_NE(temporary_name("x").string(), temporary_name("x").string());
+}
+
+TEST(AtomicFile, NamesMayBeAsLongAsTheyCanBe) {
   const TemporaryFolder folder;
-  std::set<std::string> names;
-  for (int i = 0; i < 2; ++i) {
-    // A name that is too long tells the temporary one.
-    try {
-      write_file_atomically(folder / std::string(250, 'x'), "text");
-    } catch (const SystemError& error) {
-      names.insert(error.what());
-    }
-  }
-  EXPECT_EQ(names.size(), 2U);
+  const std::string longest(250, 'x');
+  write_file_atomically(folder / longest, "text");
+  EXPECT_FALSE(create_file_atomically(folder / longest, "other"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+  const fs::path temporary = temporary_name(folder / longest);
+  EXPECT_EQ(temporary.parent_path().string(), folder.path().string());
+  EXPECT_THAT(temporary.filename().string(), StartsWith(".xxx"));
+  EXPECT_THAT(temporary.filename().string(), EndsWith(".tmp"));
 }
 
 TEST(AtomicFile, LooksOnlyWhereOneCan) {
@@ -75,6 +78,9 @@ TEST(AtomicFile, LooksOnlyWhereOneCan) {
 
 TEST(AtomicFile, OutputFolder) {
   const TemporaryFolder folder;
+  check_output_folder(folder / "a/b");
+  check_output_folder("");
+  EXPECT_TRUE(fs::is_empty(folder.path()));
   create_output_folder(folder / "a/b");
   create_output_folder(folder / "a/b");
   create_output_folder("");
@@ -84,9 +90,13 @@ TEST(AtomicFile, OutputFolder) {
               HasSubstr("Not a directory"));
   EXPECT_THAT(input_error([&] { create_output_folder(folder / "file/below"); }),
               HasSubstr("Not a directory"));
+  for (const char* name : {"file", "file/below", "file/further/below"})
+    EXPECT_THAT(input_error([&] { check_output_folder(folder / name); }),
+                HasSubstr("Not a directory"));
   if (::geteuid() != 0) {  // root may write anywhere
     fs::permissions(folder / "a", fs::perms::owner_read | fs::perms::owner_exec);
     EXPECT_THAT(input_error([&] { create_output_folder(folder / "a"); }), HasSubstr("Permission"));
+    EXPECT_THAT(input_error([&] { check_output_folder(folder / "a"); }), HasSubstr("Permission"));
     fs::permissions(folder / "a", fs::perms::owner_all);
   }
 }

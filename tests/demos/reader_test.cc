@@ -174,6 +174,23 @@ TEST(Reader, DiscreteObservationsBecomeOneHot) {
               AllOf(HasSubstr("episode_0/observations: row 1 has 4"), HasSubstr("from 1 to 3")));
 }
 
+TEST(Reader, BracketsInTextsAreNotNested) {
+  Plain plain;
+  plain.root = with_attribute(
+      "env_spec", R"({"id": "Hopper-v5", "note": "\")" + std::string(150, '[') + R"("})");
+  EXPECT_EQ(plain.read().environment, "Hopper-v5");
+}
+
+TEST(Reader, ArraysBesideTheEpisodesAreIgnored) {
+  Plain plain;
+  plain.root = [](Group& root) {
+    const double lengths[] = {3};
+    root.write("episode_lengths", {1}, Type::kFloat64, lengths);
+    root.create_group("trajectory_-1");
+  };
+  EXPECT_EQ(plain.read().transitions(), 3);
+}
+
 TEST(Reader, AnObservationSpaceThatIsNoJsonIsReplaced) {
   Plain plain;
   plain.root = with_attribute("observation_space", "Box(-inf, inf, (2,), float64)");
@@ -195,6 +212,10 @@ TEST(Reader, RefusesWhatDoesNotFit) {
   EXPECT_THAT(broken([](Plain& p) { p.observations[3] = HUGE_VAL; }),
               HasSubstr("episode_0/observations"));
   EXPECT_THAT(broken([](Plain& p) { p.actions[3] = HUGE_VAL; }), HasSubstr("episode_0/actions"));
+  EXPECT_THAT(broken([](Plain& p) { p.observations[3] = -1e39; }),
+              HasSubstr("episode_0/observations: a number in row 1 is too large for float32"));
+  EXPECT_THAT(broken([](Plain& p) { p.actions[3] = 1e39; }),
+              HasSubstr("episode_0/actions: a number in row 1 is too large for float32"));
   EXPECT_THAT(broken([](Plain& p) { p.rewards[1] = kNaN; }), HasSubstr("episode_0/rewards"));
   EXPECT_THAT(broken([](Plain& p) { p.rewards.push_back(1); }), HasSubstr("expected (3)"));
   EXPECT_THAT(broken([](Plain& p) { p.terminations[1] = 0.5; }),
@@ -230,6 +251,11 @@ TEST(Reader, RefusesWhatDoesNotFit) {
                 p.root = [](Group& r) { r.write_attribute("total_episodes", std::int64_t{3}); };
               }),
               HasSubstr("3 episodes"));
+  EXPECT_THAT(broken([](Plain& p) { p.root = with_attribute("total_episodes", "\xff\xfe"); }),
+              HasSubstr("says there are"));
+  for (const char* name : {"episode_-1", "episode_99999999999999999999999", "episode_"})
+    EXPECT_THAT(broken([&](Plain& p) { p.root = [=](Group& r) { r.create_group(name); }; }),
+                HasSubstr(std::string(name) + " is no episode number"));
   EXPECT_THAT(broken([](Plain& p) { p.root = with_attribute("env_spec", "{"); }),
               HasSubstr("env_spec"));
   EXPECT_THAT(broken([](Plain& p) {
@@ -263,6 +289,23 @@ TEST(Reader, RefusesWhatDoesNotFit) {
               }),
               HasSubstr("episode_1/observations"));
   EXPECT_THAT(broken([](Plain& p) {
+                p.root = [](Group& r) {
+                  Plain other;
+                  other.group = "episode_1";
+                  other.action_shape = {3, 1};
+                  other.write_into(r);
+                };
+              }),
+              HasSubstr("episode_1/actions has 1 entries a step, those before 2"));
+  EXPECT_THAT(broken([](Plain& p) {
+                p.write_actions = false;
+                p.episode = [](Group& e) {
+                  const std::int64_t actions[] = {0, 70000, 1};
+                  e.write("actions", {3}, Type::kInt64, actions);
+                };
+              }),
+              HasSubstr("the discrete action 70000 is too large; the largest allowed is 65535"));
+  EXPECT_THAT(broken([](Plain& p) {
                 p.write_actions = false;
                 p.episode = [](Group& e) { e.create_group("actions"); };
               }),
@@ -281,6 +324,14 @@ TEST(Reader, RefusesOtherFiles) {
   };
   EXPECT_THAT(error(folder / "absent.hdf5"), HasSubstr("does not exist"));
   EXPECT_THAT(error(folder / ""), HasSubstr("no Minari dataset"));
+  // std::regex would exhaust the stack over these.
+  for (const std::string ending : {"", "-v0"})
+    EXPECT_THAT(error(std::string(50000, 'x') + ending), HasSubstr("File name too long"));
+  std::filesystem::create_symlink("loop", folder / "loop");
+  EXPECT_THAT(error(folder / "loop"), HasSubstr("levels of symbolic links"));
+  std::filesystem::create_directories(folder / "closed/data");
+  std::filesystem::create_symlink("main_data.hdf5", folder / "closed/data/main_data.hdf5");
+  EXPECT_THAT(error(folder / "closed"), HasSubstr("levels of symbolic links"));
   write_file_atomically(folder / "text.hdf5", std::string_view("hello"));
   EXPECT_THAT(error(folder / "text.hdf5"), HasSubstr("not a complete HDF5 file"));
   write_file_atomically(folder / "empty.hdf5", std::string_view(""));

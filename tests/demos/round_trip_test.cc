@@ -13,6 +13,7 @@
 #include "agail/demos/mask.h"
 #include "agail/demos/minari_reader.h"
 #include "agail/demos/minari_writer.h"
+#include "base/messages.h"
 #include "samples.h"
 
 namespace agail {
@@ -120,15 +121,44 @@ TEST(RoundTrip, MetadataOfTheSourceIsKept) {
 TEST(RoundTrip, NotesGoThroughAnyNumberOfFiles) {
   Demonstrations demonstrations = sample({10});
   demonstrations.metadata =
-      R"({"author": ["A. Uthor"], "note": "mine", "ref_max_score": 3234.5, "year": 2024})";
+      R"({"author": ["A. Uthor"], "note": "mine", "ref_max_score": 3234.5, "year": 2024, )"
+      R"("approved": true, "largest": 18446744073709551615})";
   const TemporaryFolder folder;
   for (const std::string name : {"a.hdf5", "b.hdf5", "dataset", "c.hdf5"}) {
     write_demonstrations(demonstrations, folder / name);
     demonstrations = read_demonstrations(folder / name);
-    for (const char* kept : {R"("author":["A. Uthor"])", R"("note":"mine")",
-                             R"("ref_max_score":3234.5)", R"("year":2024)"})
+    for (const char* kept :
+         {R"("author":["A. Uthor"])", R"("note":"mine")", R"("ref_max_score":3234.5)",
+          R"("year":2024)", R"("approved":true)", R"("largest":18446744073709551615)"})
       EXPECT_THAT(demonstrations.metadata, testing::HasSubstr(kept));
   }
+}
+
+TEST(RoundTrip, KeysThatAFileCannotKeepAreNamed) {
+  const TemporaryFolder folder;
+  Demonstrations demonstrations = sample({10});
+  for (const std::string& key : {std::string(), std::string(70000, 'k')}) {
+    demonstrations.metadata = R"({")" + key + R"(": "x"})";
+    const std::string told =
+        input_error([&] { write_demonstrations(demonstrations, folder / "a.hdf5"); });
+    EXPECT_THAT(told, testing::HasSubstr("\"" + key.substr(0, 40) + "\""));
+    EXPECT_LT(told.size(), 200U);
+    write_demonstrations(demonstrations, folder / "dataset");
+  }
+}
+
+TEST(RoundTrip, AnEmptySpecIsNone) {
+  Demonstrations demonstrations = sample({10});
+  demonstrations.metadata = R"({"env_spec": ""})";
+  EXPECT_EQ(read_demonstrations(encode_demonstrations(demonstrations), "image").environment,
+            "Hopper-v5");
+}
+
+TEST(RoundTrip, AnEmptyMinariPathIsNone) {
+  const TemporaryFolder folder;
+  setenv("MINARI_DATASETS_PATH", "", 1);
+  EXPECT_NO_THROW(write_demonstrations(sample({10}), folder / "d"));
+  unsetenv("MINARI_DATASETS_PATH");
 }
 
 TEST(RoundTrip, DatasetsAreFoundByTheirId) {
@@ -167,13 +197,37 @@ TEST(RoundTrip, ReplacesDatasetsAndNothingElse) {
   EXPECT_TRUE(std::filesystem::exists(folder / "project/data/mine.hdf5"));
   std::ofstream(folder / "d/notes.txt") << "x";
   EXPECT_THROW(write_demonstrations(sample({10}), folder / "d"), InputError);
-  EXPECT_THROW(write_demonstrations(sample({10}), folder / "precious/thesis.tex"), InputError);
+  for (const char* name : {"precious/thesis.tex", "precious/thesis.tex/"})
+    EXPECT_THROW(write_demonstrations(sample({10}), folder / name), InputError);
+  EXPECT_EQ(read_file(folder / "precious/thesis.tex"), std::vector<std::uint8_t>{'x'});
   std::filesystem::create_directory(folder / "g.hdf5");
   EXPECT_THROW(write_demonstrations(sample({10}), folder / "g.hdf5"), InputError);
   EXPECT_THROW(write_demonstrations(sample({10}), "/proc/none/f.hdf5"), InputError);
   EXPECT_THROW(write_demonstrations(sample({10}), "/proc/none/folder"), InputError);
   for (const auto& entry : std::filesystem::directory_iterator(folder / ""))
     EXPECT_THAT(entry.path().string(), testing::Not(testing::HasSubstr(".tmp")));
+}
+
+TEST(RoundTrip, NamesMayBeAsLongAsTheyCanBe) {
+  const TemporaryFolder folder;
+  for (const std::string ending : {"", ".hdf5"}) {
+    write_demonstrations(sample({10}), folder / (std::string(250, 'x') + ending));
+    EXPECT_EQ(read_demonstrations(folder / (std::string(250, 'x') + ending)).transitions(), 10);
+    EXPECT_THAT(input_error([&] {
+                  write_demonstrations(sample({10}), folder / (std::string(256, 'x') + ending));
+                }),
+                testing::HasSubstr("File name too long"));
+  }
+}
+
+TEST(RoundTrip, OutputsAreCheckedWithoutCreatingAnything) {
+  const TemporaryFolder folder;
+  for (const char* name : {"d", "d/", "new/d", "f.hdf5", "new/f.hdf5"}) check_output(folder / name);
+  EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
+  std::ofstream(folder / "file") << "x";
+  std::filesystem::create_directories(folder / "g.hdf5/other");
+  for (const char* name : {"file", "file/", "file/d", "file/f.hdf5", "g.hdf5", "g.hdf5/"})
+    EXPECT_THROW(check_output(folder / name), InputError) << name;
 }
 
 [[noreturn]] void write_on_a_full_disk(const std::string& path) {

@@ -16,6 +16,9 @@ TEST(DemonstrationsSummary, SaysWhatTheDemonstrationsSay) {
   Demonstrations without = demonstrations;
   without.episodes[1].rewards.clear();
   EXPECT_FALSE(summarise(without).mean_return);
+  Demonstrations endless = demonstrations;
+  endless.episodes[0].rewards.assign(4, 1.7e308);
+  EXPECT_FALSE(summarise(endless).mean_return);
 }
 
 TEST(DemonstrationsSummary, TheFingerprintIsOfWhatIsKnown) {

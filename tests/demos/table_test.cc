@@ -81,18 +81,12 @@ TEST_F(Csv, SaysWhatIsWrong) {
               HasSubstr("0, 1, 2"));
   EXPECT_THAT(error("obs_0,action_0\n1,1\n2,1e39\n3,1\n"),
               HasSubstr("an action in row 1 is too large for float32"));
-  EXPECT_THAT(error("obs_0\n1e39\n2\n"), HasSubstr("(no error)"));
+  EXPECT_THAT(error("obs_0\n2\n-1e39\n"),
+              HasSubstr("an observation in row 1 is too large for float32"));
   EXPECT_THAT(error("obs_0,next_obs_0\n0,1\n5,6\n"), HasSubstr("not the observation of row 1"));
   EXPECT_THAT(error("episode,obs_0,terminated\n0,1,1\n0,2,0\n0,3,0\n"),
               HasSubstr("goes on after it"));
   EXPECT_THAT(error("obs_0,action,action_0\n0,1,1\n"), HasSubstr("one kind"));
-}
-
-TEST_F(Csv, ObservationsOf32BitsMustFit) {
-  write_file_atomically(folder_ / "t.csv", std::string_view("obs_0\n0\n-1e39\n"));
-  StepTable table = read_csv(folder_ / "t.csv", ignored_);
-  table.observations_are_float32 = true;
-  EXPECT_THROW(demonstrations_from(table, "E-v0", std::nullopt), InputError);
 }
 
 TEST_F(Csv, ChecksTheKnownActionSpace) {
@@ -189,6 +183,16 @@ TEST_F(Npz, ActionsMayLeaveOutTheFinalRows) {
   EXPECT_DOUBLE_EQ(all.missing_ratio(), 1.0 / 3);
 }
 
+TEST_F(Npz, TheMaskMayLeaveOutTheFinalRows) {
+  const Demonstrations all =
+      read_npz_bytes(zip({{"observations.npy", npy("<f8", "(5, 1)", doubles({0, 1, 2, 3, 4}))},
+                          {"actions.npy", npy("<f8", "(3, 1)", doubles({10, 11, 13}))},
+                          {"action_available.npy", npy("<f8", "(3,)", doubles({1, 0, 1}))},
+                          {"episode_ends.npy", npy("<f8", "(2,)", doubles({3, 5}))}}));
+  EXPECT_EQ(all.episodes[0].available(1, 0), 0);
+  EXPECT_EQ(all.episodes[1].available(0, 0), 1);
+}
+
 TEST_F(Npz, SaysWhatIsWrong) {
   const auto observations = std::pair<std::string, std::string>{
       "observations.npy", npy("<f8", "(2, 1)", doubles({0, 1}))};
@@ -211,6 +215,27 @@ TEST_F(Npz, SaysWhatIsWrong) {
   EXPECT_THAT(
       npz_error(zip({observations, {"episode_starts.npy", npy("<f8", "(1,)", doubles({9}))}})),
       HasSubstr("row numbers"));
+  EXPECT_THAT(npz_error(zip({{"observations.npy", npy("<f8", "(0, 1)", "")}})),
+              HasSubstr("no rows"));
+  EXPECT_THAT(npz_error(zip({{"observations.npy", npy("<f8", "(2, 0)", "")}})),
+              HasSubstr("without entries"));
+  EXPECT_THAT(npz_error(zip({observations, {"rewards.npy", npy("<f8", "(0,)", "")}})),
+              HasSubstr("rewards has 0 rows"));
+  EXPECT_THAT(npz_error(zip({observations,
+                             {"episodes.npy", npy("<f8", "(2,)", doubles({0, 0}))},
+                             {"episode_starts.npy", npy("<f8", "(1,)", doubles({0}))}})),
+              HasSubstr("more than one of"));
+  const auto mask = [](const std::vector<double>& values) {
+    return std::pair<std::string, std::string>{
+        "action_available.npy",
+        npy("<f8", "(" + std::to_string(values.size()) + ",)", doubles(values))};
+  };
+  const auto actions =
+      std::pair<std::string, std::string>{"actions.npy", npy("<f8", "(2, 1)", doubles({0, 1}))};
+  EXPECT_THAT(npz_error(zip({observations, actions, mask({1, NAN})})), HasSubstr("other than 0"));
+  EXPECT_THAT(npz_error(zip({observations, mask({1, 2})})), HasSubstr("other than 0"));
+  EXPECT_THAT(npz_error(zip({observations, mask({1, 1, 1, 1, 1})})),
+              HasSubstr("action_available has 5 rows"));
 }
 
 TEST_F(Npz, SurvivesRandomDamage) {

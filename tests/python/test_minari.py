@@ -367,6 +367,16 @@ def test_formats_newer_than_ours_are_named(tmp_path):
     assert inspect(tmp_path / "b.hdf5")["transitions"] == 3
 
 
+def test_own_attributes_are_kept(tmp_path):
+    own = {"flag": np.True_, "largest": np.uint64(2**64 - 1), "note": "mine", "score": 0.5}
+    with small(tmp_path / "a.hdf5") as file:
+        file.attrs.update(own)
+    agail("mask", tmp_path / "a.hdf5", "--missing", "0.5", "--out", tmp_path / "b.hdf5")
+    with h5py.File(tmp_path / "b.hdf5") as file:
+        assert {name: file.attrs[name] for name in own} == own
+        assert file.attrs["flag"].dtype == bool and file.attrs["largest"].dtype == np.uint64
+
+
 def test_encoded_images_are_refused_as_such(tmp_path):
     with small(tmp_path / "a.hdf5") as file:
         del file["episode_0/observations"]

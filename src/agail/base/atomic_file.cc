@@ -43,16 +43,6 @@ fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
-// Random, so that two processes never write into one temporary file: process ids can be equal on
-// machines and in containers that share a file system.
-fs::path temporary_name(const fs::path& path) {
-  std::uint64_t number = 0;
-  if (::getrandom(&number, sizeof number, 0) != sizeof number) fail("name a file beside", path);
-  std::array<char, 17> digits{};
-  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(number));
-  return folder_of(path) / ("." + path.filename().string() + "." + digits.data() + ".tmp");
-}
-
 void write_bytes(const fs::path& path, std::span<const std::uint8_t> bytes) {
   const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
   if (file.get() < 0) fail("create", path);
@@ -65,11 +55,6 @@ void write_bytes(const fs::path& path, std::span<const std::uint8_t> bytes) {
   }
 }
 
-void sync_file(const fs::path& path) {
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.get() < 0 || ::fsync(file.get()) != 0) fail("write", path);
-}
-
 // Makes the rename itself durable. Some network file systems cannot (EINVAL); nothing more to do
 // there.
 void sync_folder(const fs::path& folder) {
@@ -78,7 +63,35 @@ void sync_folder(const fs::path& folder) {
   if (::fsync(handle.get()) != 0 && errno != EINVAL) fail("sync folder", folder);
 }
 
+// `error`: what kept the folder from being made, if anything did.
+void require_writable(const fs::path& folder, std::error_code error) {
+  if (!error && !fs::is_directory(folder, error) && !error)
+    error = std::make_error_code(std::errc::not_a_directory);
+  if (!error && ::access(folder.c_str(), W_OK | X_OK) != 0)
+    error = std::error_code(errno, std::generic_category());
+  if (error)
+    throw InputError("cannot create files in " + folder.string() + ": " + error.message() +
+                     "; give --out a place that you can write to");
+}
+
 }  // namespace
+
+fs::path temporary_name(const fs::path& path) {
+  // Random, so that two processes never write into one temporary file: process ids can be equal on
+  // machines and in containers that share a file system.
+  std::uint64_t number = 0;
+  if (::getrandom(&number, sizeof number, 0) != sizeof number) fail("name a file beside", path);
+  std::array<char, 17> digits{};
+  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(number));
+  constexpr std::size_t kMostBytes = 64;  // of the name, which may be as long as names can be
+  return folder_of(path) /
+         ("." + path.filename().string().substr(0, kMostBytes) + "." + digits.data() + ".tmp");
+}
+
+void sync_file(const fs::path& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0 || ::fsync(file.get()) != 0) fail("write", path);
+}
 
 void write_file_atomically(const fs::path& path, const std::function<void(const fs::path&)>& fill) {
   std::error_code ignored;
@@ -123,13 +136,13 @@ void create_output_folder(const fs::path& folder) {
   if (folder.empty()) return create_output_folder(".");
   std::error_code error;
   fs::create_directories(folder, error);
-  if (!error && !fs::is_directory(folder, error) && !error)
-    error = std::make_error_code(std::errc::not_a_directory);
-  if (!error && ::access(folder.c_str(), W_OK | X_OK) != 0)
-    error = std::error_code(errno, std::generic_category());
-  if (error)
-    throw InputError("cannot create files in " + folder.string() + ": " + error.message() +
-                     "; give --out a place that you can write to");
+  require_writable(folder, error);
+}
+
+void check_output_folder(const fs::path& folder) {
+  fs::path nearest = folder;
+  while (!nearest.empty() && !is_there(nearest)) nearest = nearest.parent_path();
+  require_writable(nearest.empty() ? fs::path(".") : nearest, {});
 }
 
 bool is_there(const fs::path& path) {

@@ -22,10 +22,19 @@ void write_file_atomically(const std::filesystem::path& path,
 // The same, unless something is there already: of several who do this at once one alone gets true.
 bool create_file_atomically(const std::filesystem::path& path, std::string_view text);
 
+// What may become `path` once it is whole: in the same folder, a name that nobody else uses, begins
+// with a dot, ends in .tmp and is not too long, however long that of `path` is.
+std::filesystem::path temporary_name(const std::filesystem::path& path);
+
+// What was written to the file is on the disk, and outlasts a power cut, when this returns.
+void sync_file(const std::filesystem::path& path);
+
 // Creates a folder that the user named (and its parents) and makes sure that files can be created
 // in it: InputError if not. For an output file, pass its parent; an empty path is the current
 // folder.
 void create_output_folder(const std::filesystem::path& folder);
+// The same InputError, as far as it can be told without creating anything.
+void check_output_folder(const std::filesystem::path& folder);
 
 // InputError if it cannot be told: no permission, a name that is too long.
 bool is_there(const std::filesystem::path& path);

@@ -18,6 +18,10 @@ class SystemError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// A message as it goes to a terminal: names that it quotes may hold line ends and escape sequences,
+// which become spaces.
+std::string one_line(std::string message);
+
 [[noreturn]] void check_failed(const char* condition, const char* file, int line);
 
 }  // namespace agail

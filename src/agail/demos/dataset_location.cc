@@ -6,6 +6,7 @@
 #include <fstream>
 #include <regex>
 
+#include "agail/base/atomic_file.h"
 #include "agail/base/error.h"
 
 namespace agail {
@@ -13,9 +14,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::regex& id_form() {
+// Whether Minari takes `text` for the id of a dataset.
+bool is_id(const std::string& text) {
   static const std::regex form(R"(([-\w][-\w/]*[-\w]/)?[-\w]+-v\d{1,9})");
-  return form;
+  // Longer ones could exhaust the stack, of which std::regex takes some for each character.
+  return text.size() < 1000 && std::regex_match(text, form);
 }
 
 // The folder of main_data.hdf5: Minari's dataset folder has it in data/, but people pass data/
@@ -23,7 +26,7 @@ const std::regex& id_form() {
 bool locate_in_folder(const fs::path& folder, DatasetLocation& location) {
   for (const fs::path& data : {folder / "data", folder}) {
     std::error_code error;
-    if (fs::is_regular_file(data / "main_data.hdf5", error)) {
+    if (is_there(data / "main_data.hdf5") && fs::is_regular_file(data / "main_data.hdf5", error)) {
       location.data = (data / "main_data.hdf5").string();
       const bool described = fs::is_regular_file(data / "metadata.json", error);
       location.metadata = described ? (data / "metadata.json").string() : "";
@@ -48,7 +51,8 @@ fs::path plain(const fs::path& folder) {
 }  // namespace
 
 std::string minari_root() {
-  if (const char* root = std::getenv("MINARI_DATASETS_PATH")) return root;
+  const char* root = std::getenv("MINARI_DATASETS_PATH");
+  if (root != nullptr && *root != '\0') return root;
   const char* home = std::getenv("HOME");
   return ((home == nullptr ? fs::path(".") : fs::path(home)) / ".minari" / "datasets").string();
 }
@@ -59,21 +63,24 @@ DatasetLocation locate_dataset(const std::string& path_or_id) {
   DatasetLocation location;
   std::error_code error;
   const fs::path path(path_or_id);
-  if (fs::is_directory(path, error)) {
+  const fs::file_status status = fs::status(path, error);
+  if (fs::is_directory(status)) {
     if (locate_in_folder(path, location)) return location;
-  } else if (fs::exists(path, error)) {
+  } else if (fs::exists(status)) {
     location.data = path_or_id;
     return location;
   }
-  if (std::regex_match(path_or_id, id_form())) {
+  if (is_id(path_or_id)) {
     if (locate_in_folder(fs::path(minari_root()) / path, location)) return location;
-    if (!fs::exists(path, error))
+    if (status.type() == fs::file_type::not_found)
       throw InputError(path_or_id + " is neither here nor among Minari's datasets in " +
                        minari_root() + "; `minari download " + path_or_id +
                        "` fetches published ones");
   }
-  if (fs::is_directory(path, error))
+  if (fs::is_directory(status))
     throw InputError(path_or_id + " is a folder without data/main_data.hdf5, so no Minari dataset");
+  if (!fs::status_known(status))
+    throw InputError("cannot open " + path_or_id + ": " + error.message());
   throw InputError(
       path_or_id +
       " does not exist; give a .hdf5 file, a Minari dataset folder or a Minari dataset id");
@@ -84,7 +91,7 @@ std::string dataset_id_for(const std::string& folder) {
   const fs::path root = plain(minari_root());
   std::string below = here.lexically_relative(root).generic_string();
   if (!below.empty() && below != "." && !below.starts_with("..")) {
-    if (!std::regex_match(below, id_form()))
+    if (!is_id(below))
       throw InputError(folder +
                        " lies among Minari's datasets, where names end in a version; call it " +
                        folder + "-v0");
@@ -94,7 +101,7 @@ std::string dataset_id_for(const std::string& folder) {
   for (char& c : name)
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_') c = '-';
   if (name.empty()) name = "demonstrations";
-  return std::regex_match(name, id_form()) ? name : name + "-v0";
+  return is_id(name) ? name : name + "-v0";
 }
 
 }  // namespace agail

@@ -15,7 +15,7 @@ struct DatasetLocation {
 // Throws InputError if nothing readable is there.
 DatasetLocation locate_dataset(const std::string& path_or_id);
 
-// Where Minari keeps its datasets: MINARI_DATASETS_PATH or ~/.minari/datasets.
+// Where Minari keeps its datasets: MINARI_DATASETS_PATH, or without it ~/.minari/datasets.
 std::string minari_root();
 
 // The id that Minari will know a dataset folder by. In Minari's own folder this is the path below

@@ -1,8 +1,17 @@
 #include "agail/demos/demonstrations.h"
 
+#include <limits>
+
 #include "agail/base/error.h"
 
 namespace agail {
+
+Eigen::Index first_row_beyond_float32(const RowMatrix<double>& values) {
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  for (Eigen::Index t = 0; t < values.rows(); ++t)
+    if ((values.row(t).array().abs() > kLargest).any()) return t;
+  return -1;
+}
 
 Eigen::Index Demonstrations::transitions() const {
   Eigen::Index sum = 0;

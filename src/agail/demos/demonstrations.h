@@ -14,6 +14,10 @@ namespace agail {
 template <class T>
 using RowMatrix = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+// The first row with a number that float32, in which policies compute, cannot hold; none: -1. NaN
+// passes.
+Eigen::Index first_row_beyond_float32(const RowMatrix<double>& values);
+
 // One trajectory of T steps.
 struct DemoEpisode {
   RowMatrix<double> observations;  // (T+1) x observation_dim, finite

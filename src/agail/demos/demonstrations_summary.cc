@@ -1,5 +1,6 @@
 #include "agail/demos/demonstrations_summary.h"
 
+#include <cmath>
 #include <iterator>
 #include <span>
 
@@ -40,7 +41,9 @@ DemonstrationsSummary summarise(const Demonstrations& demonstrations) {
   summary.episodes = demonstrations.episodes.size();
   summary.transitions = demonstrations.transitions();
   summary.missing_ratio = demonstrations.missing_ratio();
-  if (demonstrations.has_rewards()) summary.mean_return = demonstrations.mean_return();
+  // Finite rewards can have an infinite sum.
+  if (demonstrations.has_rewards() && std::isfinite(demonstrations.mean_return()))
+    summary.mean_return = demonstrations.mean_return();
   summary.fingerprint = fingerprint_of(demonstrations);
   return summary;
 }

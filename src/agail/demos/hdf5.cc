@@ -307,7 +307,17 @@ bool Group::read_number(const std::string& name, Number number, std::int64_t typ
 
 std::optional<std::int64_t> Group::integer_attribute(const std::string& name) const {
   std::int64_t value = 0;
-  if (!read_number(name, Number::kInteger, H5T_NATIVE_INT64, &value)) return std::nullopt;
+  if (!read_number(name, Number::kInteger, H5T_NATIVE_INT64, &value) || unsigned_attribute(name))
+    return std::nullopt;
+  return value;
+}
+
+// Of what does not fit into the type that is read HDF5 makes the nearest number that does.
+std::optional<std::uint64_t> Group::unsigned_attribute(const std::string& name) const {
+  constexpr std::uint64_t kMostSigned = std::numeric_limits<std::int64_t>::max();
+  std::uint64_t value = 0;
+  if (!read_number(name, Number::kInteger, H5T_NATIVE_UINT64, &value) || value <= kMostSigned)
+    return std::nullopt;
   return value;
 }
 
@@ -316,6 +326,12 @@ std::optional<double> Group::real_attribute(const std::string& name) const {
   if (!read_number(name, Number::kReal, H5T_NATIVE_DOUBLE, &value) || !std::isfinite(value))
     return std::nullopt;
   return value;
+}
+
+std::optional<bool> Group::boolean_attribute(const std::string& name) const {
+  std::int8_t value = 0;
+  if (!read_number(name, Number::kBoolean, H5T_NATIVE_INT8, &value)) return std::nullopt;
+  return value != 0;
 }
 
 Group Group::create_group(const std::string& name) {
@@ -373,8 +389,15 @@ void Group::write_attribute(const std::string& name, const std::string& text) {
 void Group::write_attribute(const std::string& name, std::int64_t number) {
   write_scalar(name, H5T_NATIVE_INT64, &number);
 }
+void Group::write_attribute(const std::string& name, std::uint64_t number) {
+  write_scalar(name, H5T_NATIVE_UINT64, &number);
+}
 void Group::write_attribute(const std::string& name, double number) {
   write_scalar(name, H5T_NATIVE_DOUBLE, &number);
+}
+void Group::write_boolean_attribute(const std::string& name, bool value) {
+  const std::int8_t number = value ? 1 : 0;
+  write_scalar(name, boolean_type().id(), &number);
 }
 
 File File::wrap(Handle handle, const std::string& name) {

@@ -68,14 +68,19 @@ class Group {
   // Nothing if there is none, or one of another kind, an infinite number or NaN included.
   std::optional<std::string> text_attribute(const std::string& name) const;
   std::optional<std::int64_t> integer_attribute(const std::string& name) const;
+  std::optional<std::uint64_t> unsigned_attribute(const std::string& name) const;  // 2^63 or more
   std::optional<double> real_attribute(const std::string& name) const;
+  std::optional<bool> boolean_attribute(const std::string& name) const;
 
   Group create_group(const std::string& name);
   void write(const std::string& name, const std::vector<std::size_t>& shape, Type type,
              const void* values);
   void write_attribute(const std::string& name, const std::string& text);
   void write_attribute(const std::string& name, std::int64_t number);
+  void write_attribute(const std::string& name, std::uint64_t number);
   void write_attribute(const std::string& name, double number);
+  // A name of its own: a literal text would be taken for a bool.
+  void write_boolean_attribute(const std::string& name, bool value);
 
  private:
   friend class File;

@@ -28,14 +28,21 @@ std::string text_of(const json& metadata, const char* key) {
                                                              : "";
 }
 
+// What is no UTF-8 is replaced.
+std::string dump(const json& value) {
+  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
 // The metadata of a single file: the attributes of its root, Minari's, ours and whoever's, that are
-// one text or number.
+// one text, number or boolean.
 json root_metadata(const hdf5::Group& root) {
   json metadata = json::object();
   for (const std::string& key : root.attribute_names()) {
     if (const auto text = root.text_attribute(key)) metadata[key] = *text;
     if (const auto number = root.integer_attribute(key)) metadata[key] = *number;
+    if (const auto number = root.unsigned_attribute(key)) metadata[key] = *number;
     if (const auto number = root.real_attribute(key)) metadata[key] = *number;
+    if (const auto flag = root.boolean_attribute(key)) metadata[key] = *flag;
   }
   for (const char* key : kListKeys) {
     const std::string text = text_of(metadata, key);
@@ -64,11 +71,16 @@ std::vector<std::string> episode_names(const hdf5::Group& root) {
   for (const std::string& name : root.names()) {
     constexpr std::string_view kPrefix = "episode_";
     if (!name.starts_with(kPrefix)) continue;
+    const hdf5::Kind kind = root.kind(name);
     std::uint64_t number = 0;
     const char* end = name.data() + name.size();
     const auto [stop, error] = std::from_chars(name.data() + kPrefix.size(), end, number);
-    if (error != std::errc{} || stop != end) continue;
-    if (root.kind(name) != hdf5::Kind::kGroup)
+    if (error != std::errc{} || stop != end) {
+      if (kind == hdf5::Kind::kDataset) continue;  // somebody's array, no episode
+      throw InputError(root.where(name) +
+                       " is no episode number; name the groups episode_0, episode_1, ...");
+    }
+    if (kind != hdf5::Kind::kGroup)
       throw InputError(root.where(name) + " is not a group of datasets");
     numbered.emplace_back(number, name);
   }
@@ -76,6 +88,12 @@ std::vector<std::string> episode_names(const hdf5::Group& root) {
   std::vector<std::string> names;
   for (auto& [number, name] : numbered) names.push_back(std::move(name));
   return names;
+}
+
+// As text, without a fraction.
+std::string whole_number(double value) {
+  const std::string text = std::to_string(value);
+  return text.substr(0, text.find('.'));
 }
 
 // The declared space, or what the numbers look like.
@@ -88,7 +106,11 @@ ActionSpace action_space_of(const std::vector<RawEpisode>& episodes, const json&
   double largest = 0;
   for (const RawEpisode& episode : episodes) {
     if (!episode.actions) continue;
-    space.dim = static_cast<int>(episode.actions->cols());
+    const auto columns = static_cast<int>(episode.actions->cols());
+    if (space.dim != 0 && columns != space.dim)
+      throw InputError(episode.where + "/actions has " + std::to_string(columns) +
+                       " entries a step, those before " + std::to_string(space.dim));
+    space.dim = columns;
     integers = integers && episode.actions_are_integers;
     // What stands in for a missing action says nothing.
     for (Eigen::Index t = 0; t < episode.steps(); ++t)
@@ -98,8 +120,8 @@ ActionSpace action_space_of(const std::vector<RawEpisode>& episodes, const json&
   if (space.dim == 0) return space;
   if (integers && space.dim == 1) {
     if (largest >= 65536)
-      throw InputError(where + ": the discrete action " + std::to_string(largest) +
-                       " is too large");
+      throw InputError(where + ": the discrete action " + whole_number(largest) +
+                       " is too large; the largest allowed is 65535");
     space.discrete = true;
     space.n = static_cast<int>(largest) + 1;
   } else {
@@ -185,7 +207,7 @@ Demonstrations read(const hdf5::Group& root, const json& metadata, const std::st
                            : ""));
   }
   if (metadata.contains("total_episodes") && metadata["total_episodes"] != names.size())
-    throw InputError(where + " says there are " + metadata["total_episodes"].dump() +
+    throw InputError(where + " says there are " + dump(metadata["total_episodes"]) +
                      " episodes, the file holds " + std::to_string(names.size()) +
                      "; it is incomplete, copy or record it again");
   const std::optional<DiscreteSpace> discrete = discrete_space_from_json(
@@ -217,8 +239,7 @@ Demonstrations read(const hdf5::Group& root, const json& metadata, const std::st
   demonstrations.actions_are_float32 = !any_actions || float32;
   for (RawEpisode& episode : episodes)
     demonstrations.episodes.push_back(finish(std::move(episode), demonstrations.action));
-  if (!metadata.empty())
-    demonstrations.metadata = metadata.dump(-1, ' ', false, json::error_handler_t::replace);
+  if (!metadata.empty()) demonstrations.metadata = dump(metadata);
   return demonstrations;
 }
 

@@ -129,9 +129,10 @@ ordered_json metadata_of(const Demonstrations& demonstrations) {
     metadata["action_space"] =
         action_space_to_json(demonstrations.action, demonstrations.actions_are_float32);
   const std::string& environment = demonstrations.environment;
-  // A spec of the source is kept (its arguments may matter) while it is of this environment.
+  // A spec of the source is kept (its arguments may matter) while it is of this environment. An
+  // empty one is none.
   bool keeps_spec = false;
-  if (source.contains("env_spec") && source["env_spec"].is_string()) {
+  if (source.contains("env_spec") && source["env_spec"].is_string() && source["env_spec"] != "") {
     const json spec = parse_python_json(source["env_spec"].get<std::string>(), "env_spec");
     keeps_spec = spec.is_object() && spec.value("id", json()) == environment;
   }
@@ -148,10 +149,24 @@ std::string dump(const ordered_json& value) {
   return value.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
+void check_key(const std::string& key) {
+  constexpr std::size_t kMostBytes = 65534;  // that HDF5 can keep
+  if (!key.empty() && key.size() <= kMostBytes && key.find('\0') == std::string::npos) return;
+  throw InputError("the metadata have a key of " + std::to_string(key.size()) + " bytes, " +
+                   dump(key.substr(0, 40)) +
+                   ", that an HDF5 file cannot keep; rename it, or write a dataset folder");
+}
+
 void write_attributes(Group& root, const ordered_json& metadata) {
+  constexpr std::uint64_t kMostSigned = std::numeric_limits<std::int64_t>::max();
   for (const auto& [key, value] : metadata.items()) {
+    check_key(key);
     if (value.is_string()) {
       root.write_attribute(key, value.get<std::string>());
+    } else if (value.is_boolean()) {
+      root.write_boolean_attribute(key, value.get<bool>());
+    } else if (value.is_number_unsigned() && value.get<std::uint64_t>() > kMostSigned) {
+      root.write_attribute(key, value.get<std::uint64_t>());
     } else if (value.is_number_integer()) {
       root.write_attribute(key, value.get<std::int64_t>());
     } else if (value.is_number()) {
@@ -163,7 +178,6 @@ void write_attributes(Group& root, const ordered_json& metadata) {
 }
 
 void write_folder(const Demonstrations& demonstrations, const std::string& path) {
-  check_replaceable_dataset(path);
   ordered_json metadata = metadata_of(demonstrations);
   metadata["dataset_id"] = dataset_id_for(path);
   replace_folder(path, [&](const fs::path& folder) {
@@ -193,7 +207,19 @@ std::vector<std::uint8_t> encode_demonstrations(const Demonstrations& demonstrat
   return file.close_and_take();
 }
 
+void check_output(const std::string& path) {
+  if (!is_single_file(path)) {
+    check_replaceable_dataset(path);
+    dataset_id_for(path);  // which must have one
+    return;
+  }
+  check_output_folder(fs::path(path).parent_path());
+  if (is_there(path) && fs::is_directory(path))
+    throw InputError("cannot write " + path + ": it is a folder; give a file name");
+}
+
 void write_demonstrations(const Demonstrations& demonstrations, const std::string& path) {
+  check_output(path);
   if (!is_single_file(path)) return write_folder(demonstrations, path);
   create_output_folder(fs::path(path).parent_path());
   write_file_atomically(path, [&](const fs::path& temporary) {

@@ -21,6 +21,10 @@ namespace agail {
 // Throws InputError if nothing can be written there, SystemError if the machine fails.
 void write_demonstrations(const Demonstrations& demonstrations, const std::string& path);
 
+// The same InputError, as far as it can be told before there are demonstrations: so that nobody
+// waits for them in vain. Creates nothing.
+void check_output(const std::string& path);
+
 // The bytes of the single file.
 std::vector<std::uint8_t> encode_demonstrations(const Demonstrations& demonstrations);
 

@@ -86,9 +86,11 @@ Array parse_npy(const std::vector<std::uint8_t>& bytes, const std::string& where
   const std::size_t data = bytes.size() - prefix - length;
   if (type.size() != 2 || width == 0)
     fail("does not hold plain numbers; use float32, float64 or int64");
-  if (columns == 0 || shape[0] > data || columns > data / width ||
-      shape[0] * columns * width != data)
-    fail("has a size that does not fit its shape; save it again");
+  if (columns == 0) fail("has rows without entries; give one vector of numbers a step");
+  const bool fits = shape[0] == 0 ? data == 0  // whatever the size of a row would be
+                                  : shape[0] <= data && columns <= data / width &&
+                                        shape[0] * columns * width == data;
+  if (!fits) fail("has a size that does not fit its shape; save it again");
   array.values.resize(static_cast<Eigen::Index>(shape[0]), static_cast<Eigen::Index>(columns));
   if (!widen(type, bytes.data() + prefix + length, array.values))
     fail("does not hold plain numbers; use float32, float64 or int64");
@@ -109,6 +111,9 @@ const Array* find(const Arrays& arrays, std::initializer_list<const char*> names
 
 std::vector<std::size_t> starts_of(const Arrays& arrays, Eigen::Index rows,
                                    const std::string& path) {
+  if (arrays.count("episodes") + arrays.count("episode_starts") + arrays.count("episode_ends") > 1)
+    throw InputError(path +
+                     " has more than one of episodes, episode_starts and episode_ends; keep one");
   if (const Array* ids = find(arrays, {"episodes"})) {
     if (ids->values.size() != rows)
       throw InputError(path + ": episodes must have one id for each observation");
@@ -143,7 +148,8 @@ RowMatrix<double> aligned(const RowMatrix<double>& values, const StepTable& tabl
   if (values.rows() == rows) return values;
   const std::vector<std::size_t> starts =
       table.starts.empty() ? std::vector<std::size_t>{0} : table.starts;
-  if (table.next_observations || values.rows() + static_cast<Eigen::Index>(starts.size()) != rows)
+  if (table.next_observations || values.rows() == 0 ||
+      values.rows() + static_cast<Eigen::Index>(starts.size()) != rows)
     throw InputError(table.where + ": " + name + " has " + std::to_string(values.rows()) +
                      " rows, observations " + std::to_string(rows) +
                      "; give as many, or one fewer for each episode");
@@ -174,22 +180,25 @@ std::vector<double> column(const Arrays& arrays, std::initializer_list<const cha
 void read_actions(const Arrays& arrays, StepTable& table) {
   table.actions.resize(table.observations.rows(), 0);
   const Array* actions = find(arrays, {"actions"});
-  if (actions == nullptr) return;
-  table.actions = aligned(actions->values, table, "actions");
-  table.discrete = actions->integers && actions->values.cols() == 1;
+  if (actions != nullptr) {
+    table.actions = aligned(actions->values, table, "actions");
+    table.discrete = actions->integers && actions->values.cols() == 1;
+  }
   const Array* mask = find(arrays, {"action_available"});
   if (mask == nullptr) return;
+  if (!((mask->values.array() == 0) || (mask->values.array() == 1)).all())
+    throw InputError(table.where +
+                     ": action_available has values other than 0 (missing) and 1 (known)");
   const RowMatrix<double> available = aligned(mask->values, table, "action_available");
+  if (actions == nullptr) return;
   if (available.cols() != 1 && available.cols() != table.actions.cols())
     throw InputError(table.where +
                      ": action_available must have one column, or as many as actions");
+  // NaN: the row of a final state.
   for (Eigen::Index t = 0; t < available.rows(); ++t)
-    for (Eigen::Index k = 0; k < table.actions.cols(); ++k) {
-      const double value = available(t, available.cols() == 1 ? 0 : k);
-      if (value != 0 && value != 1 && !std::isnan(value))
-        throw InputError(table.where + ": action_available has values other than 0 and 1");
-      if (value != 1) table.actions(t, k) = std::numeric_limits<double>::quiet_NaN();
-    }
+    for (Eigen::Index k = 0; k < table.actions.cols(); ++k)
+      if (available(t, available.cols() == 1 ? 0 : k) != 1)
+        table.actions(t, k) = std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace

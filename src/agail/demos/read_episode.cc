@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "agail/base/error.h"
 
@@ -59,6 +60,11 @@ RowMatrix<double> read_column(const Group& group, const std::string& name, Eigen
   return std::move(table.values);
 }
 
+[[noreturn]] void refuse_beyond_float32(const std::string& where, Eigen::Index row) {
+  throw InputError(where + ": a number in row " + std::to_string(row) +
+                   " is too large for float32; use other units");
+}
+
 void read_observations(const Group& group, RawEpisode& episode) {
   Table table = read_table(group, "observations");
   if (table.values.rows() < 2)
@@ -67,6 +73,8 @@ void read_observations(const Group& group, RawEpisode& episode) {
   if (!table.values.allFinite())
     throw InputError(group.where("observations") +
                      " has NaN or infinite entries; only actions may be missing");
+  const Eigen::Index beyond = first_row_beyond_float32(table.values);
+  if (beyond >= 0) refuse_beyond_float32(group.where("observations"), beyond);
   episode.observations = std::move(table.values);
   episode.observations_are_float32 =
       table.info.number == hdf5::Number::kReal && table.info.bytes == 4;
@@ -116,6 +124,18 @@ void read_mask(const Group& group, RawEpisode& episode) {
         throw InputError(where + " says 1 (known) for step " + std::to_string(t) +
                          ", where the action is NaN; set it to 0");
   episode.available = mask.cast<std::uint8_t>();
+}
+
+// What stands in for a missing action may be anything.
+void check_known_actions(const Group& group, const RawEpisode& episode) {
+  if (!episode.actions) return;
+  for (Eigen::Index t = 0; t < episode.steps(); ++t)
+    for (Eigen::Index k = 0; k < episode.actions->cols(); ++k) {
+      const bool known = !episode.available ||
+                         (*episode.available)(t, episode.available->cols() == 1 ? 0 : k) == 1;
+      if (known && std::abs((*episode.actions)(t, k)) > std::numeric_limits<float>::max())
+        refuse_beyond_float32(group.where("actions"), t);
+    }
 }
 
 void read_rewards(const Group& group, RawEpisode& episode) {
@@ -172,6 +192,7 @@ RawEpisode read_episode(const Group& group) {
   read_observations(group, episode);
   read_actions(group, episode);
   read_mask(group, episode);
+  check_known_actions(group, episode);
   read_rewards(group, episode);
   episode.rest.terminations = read_flags(group, "terminations", episode.steps());
   episode.rest.truncations = read_flags(group, "truncations", episode.steps());

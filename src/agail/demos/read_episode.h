@@ -10,10 +10,10 @@
 namespace agail {
 
 struct RawEpisode {
-  std::string where;               // for messages
-  RowMatrix<double> observations;  // (T+1) x observation_dim, finite
-  std::optional<RowMatrix<double>>
-      actions;  // T x action_dim, NaN or finite; absent: the file has none
+  std::string where;                         // for messages
+  RowMatrix<double> observations;            // (T+1) x observation_dim, finite, also in float32
+  std::optional<RowMatrix<double>> actions;  // T x action_dim, NaN or finite, known ones also in
+                                             // float32; absent: the file has none
   std::optional<RowMatrix<std::uint8_t>>
       available;     // T x 1 or T x action_dim, 0 or 1; absent: no mask
   DemoEpisode rest;  // rewards, terminations, truncations, seed

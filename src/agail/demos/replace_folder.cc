@@ -30,9 +30,17 @@ void sync(const fs::path& folder) {
   ::close(handle);
 }
 
-void put_in_place(const fs::path& made, const fs::path& folder) {
+// A file there is somebody's. False if nothing is there.
+bool is_folder(const fs::path& path) {
+  if (!is_there(path)) return false;
   std::error_code error;
-  if (!fs::exists(folder, error)) {
+  if (fs::is_directory(path, error)) return true;
+  throw InputError(path.string() +
+                   " is a file; end the name in .hdf5 for one file, or give a new folder");
+}
+
+void put_in_place(const fs::path& made, const fs::path& folder) {
+  if (!is_folder(folder)) {
     if (::rename(made.c_str(), folder.c_str()) == 0) return;
   } else if (::renameat2(AT_FDCWD, made.c_str(), AT_FDCWD, folder.c_str(), RENAME_EXCHANGE) == 0) {
     fs::remove_all(made);  // the old one, now
@@ -57,13 +65,11 @@ bool holds_nothing_but(const std::set<fs::path>& names, const fs::path& folder) 
 
 }  // namespace
 
-void check_replaceable_dataset(const fs::path& folder) {
+void check_replaceable_dataset(const fs::path& target) {
+  const fs::path folder = without_slash(target);  // "file/" is not there, but "file" is
+  check_output_folder(folder.parent_path());
   std::error_code error;
-  if (!fs::exists(folder, error)) return;
-  if (!fs::is_directory(folder, error))
-    throw InputError(folder.string() +
-                     " is a file; end the name in .hdf5 for one file, or give a new folder");
-  if (fs::is_empty(folder, error)) return;
+  if (!is_folder(folder) || fs::is_empty(folder, error)) return;
   // Whatever else lies there is somebody's.
   if (!holds_nothing_but({"data"}, folder) ||
       !holds_nothing_but({"main_data.hdf5", "metadata.json"}, folder / "data"))
@@ -75,11 +81,8 @@ void check_replaceable_dataset(const fs::path& folder) {
 void replace_folder(const fs::path& target, const std::function<void(const fs::path&)>& fill) {
   const fs::path folder = without_slash(target);
   create_output_folder(folder.parent_path());
-  // A leading dot: Minari does not list it.
-  const fs::path made = folder.parent_path() / ("." + folder.filename().string() + "." +
-                                                std::to_string(::getpid()) + ".tmp");
+  const fs::path made = temporary_name(folder);  // begins with a dot: Minari does not list it
   try {
-    fs::remove_all(made);
     fs::create_directory(made);
     fill(made);
     sync(made);

@@ -6,8 +6,9 @@
 
 namespace agail {
 
-// InputError unless `folder` is absent, empty, or a Minari dataset and nothing else.
-void check_replaceable_dataset(const std::filesystem::path& folder);
+// InputError unless `target`, with a slash at its end or without, lies where one can write and is
+// absent, an empty folder, or a Minari dataset and nothing else.
+void check_replaceable_dataset(const std::filesystem::path& target);
 
 // `fill` writes into a temporary sibling, which then takes the place of `target` in one step (where
 // the file system can exchange two names; elsewhere there is a moment without either). InputError

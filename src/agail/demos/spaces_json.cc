@@ -9,14 +9,21 @@ namespace agail {
 namespace {
 
 using nlohmann::json;
+using nlohmann::ordered_json;
 
 constexpr int kMostNumbers = 1 << 16;
+constexpr int kDeepest = 100;
 
-// Bare Infinity, -Infinity and NaN as strings; what stands inside of strings is left alone.
+int nesting(char c) { return c == '{' || c == '[' ? 1 : c == '}' || c == ']' ? -1 : 0; }
+
+// Bare Infinity, -Infinity and NaN as strings; what stands inside of strings is left alone. Empty,
+// which is no JSON, if it is nested so deep that handling it could exhaust the stack: no metadata
+// are.
 std::string quote_constants(const std::string& text) {
   std::string out;
   out.reserve(text.size());
   bool inside = false;
+  int depth = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (inside && text[i] == '\\' && i + 1 < text.size()) {
       out += text[i++];
@@ -24,6 +31,8 @@ std::string quote_constants(const std::string& text) {
       continue;
     }
     if (text[i] == '"') inside = !inside;
+    if (!inside) depth += nesting(text[i]);
+    if (depth > kDeepest) return {};
     bool replaced = false;
     for (const char* constant : {"-Infinity", "Infinity", "NaN"}) {
       if (inside || text.compare(i, std::char_traits<char>::length(constant), constant) != 0)
@@ -82,17 +91,15 @@ std::vector<float> bounds(const json& values, std::size_t dim, const std::string
 
 }  // namespace
 
-json parse_python_json(const std::string& text, const std::string& where) {
-  // Deep nesting would exhaust the parser's stack; no metadata has it.
-  int depth = 0;
-  for (const char c : text) {
-    depth += (c == '{' || c == '[') ? 1 : (c == '}' || c == ']') ? -1 : 0;
-    if (depth > 100) throw InputError(where + " is not valid JSON");
-  }
-  json parsed = json::parse(quote_constants(text), nullptr, /*allow_exceptions=*/false);
+template <class Json>
+Json parse_python_json(const std::string& text, const std::string& where) {
+  Json parsed = Json::parse(quote_constants(text), nullptr, /*allow_exceptions=*/false);
   if (parsed.is_discarded()) throw InputError(where + " is not valid JSON");
   return parsed;
 }
+
+template json parse_python_json<json>(const std::string&, const std::string&);
+template ordered_json parse_python_json<ordered_json>(const std::string&, const std::string&);
 
 json space_from_json(const std::string& text) {
   try {

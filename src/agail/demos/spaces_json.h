@@ -12,8 +12,9 @@ namespace agail {
 
 // Python's json writes and reads Infinity, -Infinity and NaN, which JSON does not have. Here they
 // become the strings of that name. Throws InputError, starting with `where`, if it is not JSON
-// either way.
-nlohmann::json parse_python_json(const std::string& text, const std::string& where);
+// either way, or nested more than 100 deep. Json: nlohmann::json or nlohmann::ordered_json.
+template <class Json = nlohmann::json>
+Json parse_python_json(const std::string& text, const std::string& where);
 
 // {"type": "Box", ...} or {"type": "Discrete", ...}.
 std::string action_space_to_json(const ActionSpace& space, bool is_float32);

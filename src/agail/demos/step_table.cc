@@ -16,14 +16,12 @@ bool flag(const std::vector<double>& flags, std::size_t row) {
 
 std::string row_name(std::size_t row) { return "row " + std::to_string(row); }
 
-// What is kept with 32 bits must not become infinite there. NaN passes.
 void fits_float32(const StepTable& table, const RowMatrix<double>& values,
                   const std::string& what) {
-  constexpr double kLargest = std::numeric_limits<float>::max();
-  for (Eigen::Index t = 0; t < values.rows(); ++t)
-    if ((values.row(t).array().abs() > kLargest).any())
-      throw InputError(table.where + ": " + what + " in " + row_name(static_cast<std::size_t>(t)) +
-                       " is too large for float32; use other units");
+  const Eigen::Index row = first_row_beyond_float32(values);
+  if (row >= 0)
+    throw InputError(table.where + ": " + what + " in " + row_name(static_cast<std::size_t>(row)) +
+                     " is too large for float32; use other units");
 }
 
 void check_table(const StepTable& table) {
@@ -33,7 +31,7 @@ void check_table(const StepTable& table) {
         throw InputError(table.where + ": " + what + " in " +
                          row_name(static_cast<std::size_t>(t)) +
                          " is empty, NaN or infinite; only actions may be missing");
-    if (table.observations_are_float32) fits_float32(table, values, what);
+    fits_float32(table, values, what);
   };
   if (table.observations.rows() == 0) throw InputError(table.where + " has no rows");
   bad(table.observations, "an observation");
