@@ -33,10 +33,11 @@ nlohmann::ordered_json measure_stepping(const TrainingTask& task, int batches,
   });
   const EnvironmentSpec& spec = collector->spec();
   Batch batch(spec.observation_dim, spec.action.dim, run.lanes, run.batch_steps / run.lanes);
+  const ActionSpace actions = ActionUnits(spec.action).space();
   constexpr int kWarmUp = 3;
   double seconds = 0;
   for (int i = 0; i < kWarmUp + batches; ++i) {
-    draw_actions(spec.action,
+    draw_actions(actions,
                  RandomStream(task.seed, Purpose::kDiagnostics, 1, static_cast<std::uint32_t>(i)),
                  batch.actions);
     largest(communicator, 0);  // all start together, and the slowest rank's time counts

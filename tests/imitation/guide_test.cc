@@ -221,7 +221,7 @@ TEST_P(GuideTest, LearnsATableOfActions) {
 
 // a_E = 0.8 s + 0.3 with deviation 0.2.
 TEST_P(GuideTest, LearnsALinearGaussian) {
-  const ActionSpace space = continuous_actions(1, 4);
+  const ActionSpace space = continuous_actions(1);
   RandomStream random(1, Purpose::kRecord);
   Matrix<double> states(1, kDemos + 1), actions(1, kDemos);
   for (Index j = 0; j <= kDemos; ++j) {
@@ -294,7 +294,7 @@ TEST_P(GuideTest, LearnsALinearGaussian) {
 
 // exp(-z^2 / 2) against the log-density of the same network.
 TEST_P(GuideTest, LikelihoodIsTheDensityOverItsPeak) {
-  const ActionSpace space = continuous_actions(1, 4);
+  const ActionSpace space = continuous_actions(1);
   const Matrix<double> states = reference::normal_matrix(1, 201, 1);
   const DemoData demos(demonstrations_from(states, reference::normal_matrix(1, 200, 2), space));
   const PolicyNetwork<float> network(1, {8}, space);

@@ -37,4 +37,10 @@ void Environment::restore(std::span<const double> state) {
   elapsed_ = static_cast<int>(state[0]);
 }
 
+std::string sizes_in_words(int observations, const ActionSpace& action) {
+  return std::to_string(observations) + " observations and " +
+         (action.discrete ? std::to_string(action.n) + " discrete actions"
+                          : std::to_string(action.dim) + " continuous action dimensions");
+}
+
 }  // namespace agail

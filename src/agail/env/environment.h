@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -19,6 +20,9 @@ struct EnvironmentSpec {
   bool observation_is_float32 = false;  // Gymnasium's dtype; values are handed out as double
   ActionSpace action;
   int max_episode_steps = 0;  // 0: the environment itself tells when an episode is truncated
+  // How its own observations and actions differ from these, where its source tells: kept with
+  // policies (PolicyInfo::layout).
+  std::map<std::string, std::vector<std::int64_t>> layout{};
 };
 
 struct StepResult {
@@ -75,6 +79,9 @@ std::unique_ptr<Environment> make_environment(const std::string& id);
 
 // Version of the physics library, e.g. "4.0.0".
 std::string physics_version();
+
+// "11 observations and 3 continuous action dimensions", for messages.
+std::string sizes_in_words(int observations, const ActionSpace& action);
 
 // The spec without building an environment.
 EnvironmentSpec environment_spec(const std::string& id);

@@ -19,7 +19,8 @@ thread_local EnvironmentSource* current_source = nullptr;
 [[noreturn]] void refuse(const std::string& id) {
   const std::vector<std::string> ids = environment_ids();
   throw InputError("no environment '" + id + "'; did you mean '" + nearest(id, ids) +
-                   "'? `agail envs` lists them");
+                   "'? `agail envs` lists them; Gymnasium's other environments need agail's "
+                   "Python package");
 }
 
 }  // namespace

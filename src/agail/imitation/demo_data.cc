@@ -2,12 +2,14 @@
 
 #include <algorithm>
 
+#include "agail/rl/action_units.h"
+
 namespace agail {
 namespace {
 
 // As the environment takes it: a policy's actions, which are compared with these, are executed
 // within the bounds, too.
-float executed(const ActionSpace& space, Index i, float action) {
+float within_bounds(const ActionSpace& space, Index i, float action) {
   if (space.discrete) return action;
   const auto entry = static_cast<std::size_t>(i);
   return std::clamp(action, space.low[entry], space.high[entry]);
@@ -18,6 +20,7 @@ float executed(const ActionSpace& space, Index i, float action) {
 DemoData::DemoData(const Demonstrations& demos) {
   const Index n = demos.transitions();
   const Index dim = demos.action.dim;
+  const ActionUnits units(demos.action);
   states.resize(demos.observation_dim, n);
   final_states.resize(demos.observation_dim, static_cast<Index>(demos.episodes.size()));
   ends.assign(static_cast<std::size_t>(n), -1);
@@ -30,7 +33,8 @@ DemoData::DemoData(const Demonstrations& demos) {
       Index known = 0;
       for (Index i = 0; i < dim; ++i) {
         if (episode.available(t, i) == 0) continue;  // what stands in a missing entry is never read
-        actions(i, column) = executed(demos.action, i, static_cast<float>(episode.actions(t, i)));
+        actions(i, column) = units.from_environment(
+            i, within_bounds(demos.action, i, static_cast<float>(episode.actions(t, i))));
         available(i, column) = 1;
         ++known;
       }

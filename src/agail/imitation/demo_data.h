@@ -28,11 +28,11 @@ struct DemoData {
   // Bytes that demonstrations of this size will take here.
   static std::uint64_t memory(const Demonstrations& demos);
 
-  Matrix<float> states;        // observation_dim x n, s_t
-  Matrix<float> actions;       // action_dim x n (discrete: the index), within the space's bounds; 0
-                               // where missing, whatever the file holds there
-  Matrix<float> available;     // action_dim x n, 1 where known
-  Matrix<float> final_states;  // observation_dim x episodes: the states after the last actions
+  Matrix<float> states;     // observation_dim x n, s_t
+  Matrix<float> actions;    // action_dim x n (discrete: the index), within the space's bounds, in
+                            // ActionUnits; 0 where missing, whatever the file holds there
+  Matrix<float> available;  // action_dim x n, 1 where known
+  Matrix<float> final_states;      // observation_dim x episodes: the states after the last actions
   std::vector<std::int32_t> ends;  // n: the episode whose last step this is, or -1
   std::vector<Index> some_action;  // columns with any known entry
   std::vector<Index> full_action;  // columns with all entries known

@@ -33,6 +33,7 @@ Collector::Collector(const std::string& environment, Index lanes, std::uint64_t 
     lane.environment = make_environment(environment);
     lane.finished.reserve(4096);
   }
+  units_.emplace(spec().action);
 }
 
 void Collector::start_episode(Index index) {
@@ -78,7 +79,6 @@ void Collector::act(Index index, const PolicyNetwork<float>& network, const Vect
   using Clock = std::chrono::steady_clock;
   Lane& lane = lanes_[static_cast<std::size_t>(index)];
   Environment& environment = *lane.environment;
-  const ActionSpace& space = environment.spec().action;
   double physics = 0;
   const Clock::time_point begin = Clock::now();
   if (first == 0) {
@@ -106,7 +106,7 @@ void Collector::act(Index index, const PolicyNetwork<float>& network, const Vect
     float* action = batch.actions.col(j).data();
     network.distribution.sample(worker.tape.outputs.back().data(), network.log_std(theta.data()),
                                 random, action);
-    clip_action(space, action, worker.executed.data());
+    units_->execute(action, worker.executed.data());
 
     const Clock::time_point before = Clock::now();
     const StepResult result = environment.step(worker.executed);
@@ -161,8 +161,7 @@ void Collector::replay(const Batch& batch) {
     std::vector<float> executed(static_cast<std::size_t>(spec().action.dim));
     if (lane.episode < 0) start_episode(index);
     for (Index t = first; t < end; ++t) {
-      clip_action(spec().action, batch.actions.col(index * batch.steps + t).data(),
-                  executed.data());
+      units_->execute(batch.actions.col(index * batch.steps + t).data(), executed.data());
       const StepResult result = lane.environment->step(executed);
       lane.episode_return += result.reward;
       if (result.terminated || result.truncated) start_episode(index);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,7 @@
 #include "agail/comm/team.h"
 #include "agail/env/environment.h"
 #include "agail/nn/normalizer.h"
-#include "agail/rl/policy_network.h"
+#include "agail/rl/action_units.h"
 
 namespace agail {
 
@@ -37,7 +38,7 @@ struct Batch {
   Matrix<float> observations;  // observation_dim x n
   Matrix<float>
       inputs;  // the same, normalised, with a row of ones: what policy and value networks see
-  Matrix<float> actions;             // action_dim x n, as sampled (not clipped)
+  Matrix<float> actions;             // action_dim x n, in ActionUnits, as sampled (not clipped)
   Vector<float> rewards;             // n, the environment's
   std::vector<Ending> endings;       // n
   Matrix<float> final_observations;  // the state after a column that truncates or ends its lane;
@@ -46,7 +47,7 @@ struct Batch {
   std::int64_t diverged = 0;  // episodes that ended because the simulation broke down
 };
 
-// What the environment executes: the action within its bounds.
+// The action within the bounds of `space`.
 void clip_action(const ActionSpace& space, const float* sampled, float* executed);
 
 class Collector {
@@ -107,6 +108,7 @@ class Collector {
   Team team_;
   Share own_;  // this rank's lanes
   std::vector<Lane> lanes_;
+  std::optional<ActionUnits> units_;  // once there is an environment
   struct Turn {
     Index lane, step;
   };

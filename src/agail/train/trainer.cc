@@ -15,10 +15,15 @@ constexpr std::size_t kRecentEpisodes = 100;
 // inferred actions are so poor that the adversarial part starts from next to nothing.
 constexpr std::int64_t kExploringRounds = 6, kExploringEpochs = 60;
 
-std::string dimensions(int observations, const ActionSpace& action) {
-  return std::to_string(observations) + " observations and " +
-         (action.discrete ? std::to_string(action.n) + " discrete actions"
-                          : std::to_string(action.dim) + " continuous action dimensions");
+// Bytes that fit_actions() takes for n steps: inputs, targets, and the outputs of all layers for
+// the held-out ones.
+std::uint64_t memory_to_fit(Index n, Index inputs, const Sizes& hidden, const ActionSpace& action,
+                            double validation_share) {
+  const auto step = static_cast<double>(inputs + 1 + 2 * action.dim);
+  const double layers = static_cast<double>(action.encoded_dim()) +
+                        std::accumulate(hidden.begin(), hidden.end(), 0.0);
+  return static_cast<std::uint64_t>(sizeof(float) * static_cast<double>(n) *
+                                    (step + validation_share * (step + layers)));
 }
 
 }  // namespace
@@ -37,6 +42,7 @@ void check_settings(const Settings& settings, const std::string& environment,
 Trainer::Trainer(TrainingTask task, Communicator& communicator)
     : task_(std::move(task)),
       spec_(environment_spec(task_.environment)),
+      units_(spec_.action),
       pool_(task_.threads),
       team_(pool_, communicator),
       network_(spec_.observation_dim, task_.settings.policy.hidden, spec_.action),
@@ -79,8 +85,9 @@ void Trainer::check() {
   const bool same_kind = demos.action.discrete == spec_.action.discrete &&
                          demos.action.dim == spec_.action.dim && demos.action.n <= spec_.action.n;
   if (demos.observation_dim != spec_.observation_dim || !same_kind)
-    throw InputError("the demonstrations have " + dimensions(demos.observation_dim, demos.action) +
-                     ", " + spec_.id + " has " + dimensions(spec_.observation_dim, spec_.action) +
+    throw InputError("the demonstrations have " +
+                     sizes_in_words(demos.observation_dim, demos.action) + ", " + spec_.id +
+                     " has " + sizes_in_words(spec_.observation_dim, spec_.action) +
                      "; give demonstrations of this environment");
   if (demos.transitions() == 0)
     throw InputError("the demonstrations have no steps; record at least one episode");
@@ -99,12 +106,12 @@ void Trainer::start() {
     normalizer_frozen_ = true;
     normalizer_.update(pool_, demos_->states);
     bco_ = std::make_unique<BehaviorCloningFromObservation>(
-        network_, normalizer_, *demos_, spec_.action, settings, pool_, task_.seed);
+        network_, normalizer_, *demos_, units_.space(), settings, pool_, task_.seed);
     return;
   }
   const bool adversarial = task_.method != "bc";
   if (adversarial)
-    reward_ = std::make_unique<AdversarialReward>(task_.method, *demos_, spec_.action, missing,
+    reward_ = std::make_unique<AdversarialReward>(task_.method, *demos_, units_.space(), missing,
                                                   settings, team_, batch_.size(), task_.seed);
 
   // state-gail is the method that never looks at an action.
@@ -119,9 +126,19 @@ void Trainer::start() {
   if (!has_actions) return;
 
   const bool infers = adversarial && settings.start.method == "clone-inferred" && missing > 0;
+  const Index n = demos_->size(), inputs = spec_.observation_dim;
+  if (infers)
+    require_memory(memory_to_fit(n, 2 * inputs, settings.inverse_dynamics.hidden, spec_.action,
+                                 RegressionSettings().validation_share) +
+                       demos_->states.size() * sizeof(float),
+                   "inferring the missing actions of these demonstrations");
+  if (clones)
+    require_memory(memory_to_fit(n, inputs, settings.policy.hidden, spec_.action,
+                                 settings.bc.validation_share),
+                   "cloning these demonstrations");
   targets_ = {demos_->actions, demos_->available, demos_->some_action};
   if (infers) {
-    inverse_dynamics_ = infer_missing_actions(*demos_, spec_.action, settings.inverse_dynamics,
+    inverse_dynamics_ = infer_missing_actions(*demos_, units_.space(), settings.inverse_dynamics,
                                               settings.policy.observation_clip, pool_, task_.seed,
                                               targets_.actions, targets_.available);
     targets_.columns.resize(static_cast<std::size_t>(demos_->size()));
@@ -133,7 +150,7 @@ void Trainer::start() {
       Settings exploring = settings;
       exploring.bco.epochs = kExploringEpochs;
       bco_ = std::make_unique<BehaviorCloningFromObservation>(
-          network_, normalizer_, *demos_, spec_.action, exploring, pool_, task_.seed);
+          network_, normalizer_, *demos_, units_.space(), exploring, pool_, task_.seed);
     }
   }
   if (clones) {
@@ -182,6 +199,20 @@ void Trainer::learn(UpdateReport& report) {
   stopwatch_.start(Phase::kValue);
   value_.fit(batch_.inputs, advantage_.targets(), n, number);
   stopwatch_.start(Phase::kRest);
+  check_finite(report);
+}
+
+// A NaN in one network reaches the policy's gradient, and from then on no step is taken.
+void Trainer::check_finite(const UpdateReport& report) const {
+  const auto fail = [&](const std::string& what, const std::string& setting) {
+    throw InputError("training diverged after " + std::to_string(timesteps_) + " steps: " + what +
+                     " is not finite; lower " + setting);
+  };
+  if (!value_.finite()) fail("the value network", "value.learning_rate");
+  if (report.trpo && !std::isfinite(report.trpo->gradient_norm))
+    fail("the policy's gradient", reward_ ? "discriminator.learning_rate, guide.learning_rate or "
+                                            "the weights of the rewards"
+                                          : "value.learning_rate or the scale of the rewards");
 }
 
 UpdateReport Trainer::update() {
@@ -203,7 +234,7 @@ UpdateReport Trainer::update() {
   diverged_ += batch_.diverged;
 
   if (bco_)
-    report.bco = bco_->update(batch_, number, theta_, targets_);
+    report.bco = bco_->update(batch_, number, finished(), theta_, targets_);
   else
     learn(report);
   if (exploring_rounds_ && report.bco && --*exploring_rounds_ == 0) bco_.reset();
@@ -228,12 +259,15 @@ UpdateReport Trainer::update() {
 }
 
 SavedPolicy Trainer::policy() const {
-  PolicyInfo info{spec_.id, task_.method, timesteps_, task_.settings_toml, {}};
+  PolicyInfo info{spec_.id, task_.method, timesteps_, task_.settings_toml, {}, spec_.layout};
   if (demonstrations_) info.demonstrations_mean_return = demonstrations_->mean_return;
-  return {std::move(info), spec_.observation_dim,
-          spec_.action,    task_.settings.policy.hidden,
-          normalizer_,     normalizer_.standard_deviation(),
-          theta_};
+  return {std::move(info),
+          spec_.observation_dim,
+          spec_.action,
+          task_.settings.policy.hidden,
+          normalizer_,
+          normalizer_.standard_deviation(),
+          units_.in_environment(network_, theta_)};
 }
 
 void Trainer::archive(Archive& a) {

@@ -91,9 +91,11 @@ class Trainer {
   void check();
   void start();
   void learn(UpdateReport& report);
+  void check_finite(const UpdateReport& report) const;
 
   TrainingTask task_;
   EnvironmentSpec spec_;
+  ActionUnits units_;
   ThreadPool pool_;
   Team team_;
   std::optional<DemonstrationsSummary> demonstrations_;
