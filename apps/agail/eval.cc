@@ -71,7 +71,7 @@ void add_eval(CLI::App& app) {
   command->add_option("POLICY", options->policy, "A run folder or a .safetensors file")->required();
   command->add_option("--episodes", options->episodes, "Default 50")
       ->check(whole_number(1, 1'000'000));
-  command->add_option("--seed", options->seed, "Names the episodes")->check(any_seed());
+  command->add_option("--seed", options->seed, "Names the episodes; default 0")->check(any_seed());
   command->add_flag("--stochastic", options->stochastic,
                     "Sample actions instead of taking the mode");
   command->add_flag("--json", options->json, "Print JSON");

@@ -106,7 +106,9 @@ void add_reproduce(CLI::App& app) {
                       "Only these of agail's 0 0.25 0.5 0.75");
   command->add_option("--seeds", options->filter.seeds, "In place of 0 1 2 3 4 5")
       ->check(any_seed());
-  command->add_option("--jobs", options->jobs, "Runs at a time; default: the cores of this machine")
+  command
+      ->add_option("--jobs", options->jobs,
+                   "Runs at a time; default: the cores of this machine or container")
       ->check(whole_number(1, 4096));
   command->add_option("--shard", options->shard,
                       "i/n: part i of n (from 1), for several machines with a common --out");

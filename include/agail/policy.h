@@ -34,7 +34,8 @@ class Policy {
 
   // The deterministic action for one observation, as the environment gives it (normalisation is
   // inside); allocates nothing. `observation`: observation_size() values; `action`: action_size()
-  // values, within the bounds; discrete: the action's index. std::invalid_argument for other sizes.
+  // values, within the bounds; discrete: the action's index, counted from 0.
+  // std::invalid_argument for other sizes.
   void act(std::span<const double> observation, Workspace& workspace,
            std::span<float> action) const;
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import errno
+import os
 import sys
 from collections.abc import Callable
 from typing import NoReturn
@@ -25,9 +27,17 @@ def run(work: Callable[[], None]) -> None:
     except InputError as error:
         print(f"agail: {error}", file=sys.stderr)
         sys.exit(2)
-    except OSError as error:
+    except (OSError, RuntimeError) as error:
         print(f"agail: {error}", file=sys.stderr)
         sys.exit(1)
+
+
+def unwritten(path: str | os.PathLike[str], error: OSError, advice: str) -> Exception:
+    """What to raise: InputError where the path is wrong, RuntimeError where the machine failed."""
+    told = f"{os.fspath(path)}: cannot be written ({error.strerror})"
+    if error.errno in (errno.ENOENT, errno.EISDIR, errno.EACCES, errno.ENOTDIR):
+        return InputError(f"{told}; {advice}")
+    return RuntimeError(told)
 
 
 def missing(package: str, extra: str) -> InputError:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from agail._core import InputError, Policy
 from agail._pictures import beside, captioned
+from agail._recording import Seen, act
 from agail._rendering import Placer, draw, make_drawn
 from agail._source import Source
 from agail.demonstrations import Episode
@@ -54,7 +55,7 @@ class Player:
         """InputError if they do not fit."""
         self.environment = make_drawn(name, size)
         self._policy = policy
-        source = Source(self.environment)
+        self._source = source = Source(self.environment)
         sizes = source.observations.size, source.actions.size, source.spec(source.name).get("n", 0)
         if sizes != (policy.observation_dim, policy.action_dim, policy.n_actions):
             raise InputError(
@@ -62,20 +63,20 @@ class Player:
                 f"{policy.observation_dim} numbers, not {sizes[0]}, or has other actions; give "
                 "another --env"
             )
-        self._lane = source.make(source.name)
+        self._lane = source.lane(Seen)
 
     def moments(self, seed: int, start: NDArray[np.float64] | None) -> Iterator[Moment]:
         """One episode, with the mode of the policy; start: the observation of its first state."""
         placer = None if start is None else Placer(self.environment)
-        observation = self._lane.reset(seed)
+        self._lane.reset(seed)
         if placer is not None:
             placer.put(start)
-            observation = start
+            self._lane.seen = start
         moment = Moment()
         yield moment
         while not moment.end:
-            self._lane.action[:] = self._policy.predict(observation)[0]
-            observation, reward, terminated, truncated = self._lane.step()
+            act(self._policy, self._lane, self._source, None, deterministic=True)
+            _, reward, terminated, truncated = self._lane.step()
             moment = moment.after(reward, terminated, truncated)
             yield moment
 

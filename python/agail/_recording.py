@@ -20,7 +20,7 @@ class Predictor(Protocol):
     ) -> tuple[Any, Any]: ...
 
 
-class _Seen(Lane):
+class Seen(Lane):
     """A lane that keeps the last observation as the environment gave it, which is what predict() takes."""
 
     seen: Any
@@ -41,11 +41,11 @@ def _executed(action: Any, source: Source) -> np.ndarray | None:
     spec = source.actions.spec()
     if "n" not in spec:
         return np.clip(flat, spec["low"], spec["high"])
-    index = flat - int(source.actions.space.start)
+    index = flat - source.actions.layout.start
     return index if index[0] in range(spec["n"]) else None
 
 
-def _act(model: Predictor, lane: _Seen, source: Source, state: Any, deterministic: bool) -> Any:
+def act(model: Predictor, lane: Seen, source: Source, state: Any, deterministic: bool) -> Any:
     """Asks for the next action and puts it into the lane; returns the model's new state."""
     start = np.array([lane.steps == 0])
     action, state = model.predict(
@@ -74,11 +74,11 @@ def record(
                     "truncations", "episodes")
     }  # fmt: skip
     try:
-        lane = source.lane(_Seen)
+        lane = source.lane(Seen)
         for episode in range(episodes):
             observation, state, ended = lane.reset(seed + episode), None, False
             while not ended:
-                state = _act(model, lane, source, state, deterministic)
+                state = act(model, lane, source, state, deterministic)
                 following, reward, terminated, truncated = lane.step()
                 ended = terminated or truncated
                 values = (observation, following, lane.action.copy(), reward, terminated, truncated)

@@ -60,7 +60,7 @@ def make_drawn(name: str, size: tuple[int, int] | None) -> gymnasium.Env:
         if module:
             importlib.import_module(module)
         spec = gymnasium.spec(name)
-    except (ImportError, gymnasium.error.Error) as error:
+    except Exception as error:  # no such id, or whatever the module does
         reason = " ".join(str(error).split())
         raise InputError(f"environment {name}: {reason}; --env names one of Gymnasium's") from error
     options: dict[str, Any] = {}

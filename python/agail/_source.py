@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import copy
+import difflib
 import importlib
 import itertools
 import math
+import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -13,7 +15,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from agail import _core
+from agail import _core, _layout
 from agail._core import InputError
 from agail._vector import OfOne
 
@@ -33,40 +35,39 @@ def _unsupported(name: str, kind: str, space: spaces.Space, advice: str) -> Inpu
 
 
 class _Observations:
-    """Box of any shape: its numbers in a row. Discrete: one-hot."""
+    """Box of any shape, or Discrete."""
 
     def __init__(self, name: str, space: spaces.Space):
         if isinstance(space, spaces.Box):
-            self.size = math.prod(space.shape)
+            self.layout = _layout.Observations(math.prod(space.shape), space.shape)
             self.float32 = space.dtype != np.float64
         elif isinstance(space, spaces.Discrete):
-            self.size = int(space.n)
+            self.layout = _layout.Observations(int(space.n), (), int(space.start))
             self.float32 = True
         else:
             advice = "wrap it in gymnasium.wrappers.FlattenObservation"
             raise _unsupported(name, "an observation space", space, advice)
         self.space = space
+        self.size = self.layout.size
         if self.size == 0:
             raise InputError(f"environment {name}: its observations have no numbers")
 
     def __call__(self, name: str, value: Any) -> np.ndarray:
         if isinstance(self.space, spaces.Discrete):
-            index = int(value) - int(self.space.start)
-            if not 0 <= index < self.size:
+            try:
+                return self.layout.rows(np.array([int(value)]))[0]
+            except ValueError as error:
                 raise InputError(
                     f"environment {name}: observation {value} is not in {self.space}; mend the "
                     "environment"
-                )
-            flat = np.zeros(self.size)
-            flat[index] = 1
-            return flat
+                ) from error
         array = np.array(value, np.float64, order="C")  # a copy: the environment may reuse its own
         if array.shape != self.space.shape:
             raise InputError(
                 f"environment {name}: an observation of shape {array.shape}, but its "
                 f"observation_space has {self.space.shape}; mend the environment"
             )
-        return array.reshape(-1)
+        return self.layout.rows(array[None])[0]
 
 
 class _Actions:
@@ -75,14 +76,15 @@ class _Actions:
     def __init__(self, name: str, space: spaces.Space):
         self.space = space
         if isinstance(space, spaces.Discrete):
-            self.size = 1
+            self.layout = _layout.Actions(1, (), int(space.start))
         elif isinstance(space, spaces.Box) and np.issubdtype(space.dtype, np.floating):
-            self.size = math.prod(space.shape)
+            self.layout = _layout.Actions(math.prod(space.shape), space.shape)
         else:
             advice = "continuous ones must be of floating point"
             if isinstance(space, spaces.MultiDiscrete | spaces.MultiBinary):
                 advice = "number the combinations in a wrapper with a Discrete space"
             raise _unsupported(name, "an action space", space, advice)
+        self.size = self.layout.size
         if self.size == 0:
             raise InputError(f"environment {name}: its actions have no numbers")
 
@@ -97,9 +99,9 @@ class _Actions:
 
     def __call__(self, action: np.ndarray) -> Any:
         if isinstance(self.space, spaces.Discrete):
-            return np.int64(int(action[0]) + int(self.space.start))
+            return self.layout.own(action.astype(np.int64))[0]
         # A copy, as the environment may keep it; a float32 bound may round outside of a float64 one.
-        value = action.astype(self.space.dtype).reshape(self.space.shape)
+        value = self.layout.own(action.astype(self.space.dtype)[None])[0]
         return np.clip(value, self.space.low, self.space.high)
 
 
@@ -171,6 +173,15 @@ AnyLane = TypeVar("AnyLane", bound=Lane)
 
 def _is_built_in(environment: EnvironmentLike) -> bool:
     return isinstance(environment, str) and environment in _core.environment_ids()
+
+
+def close(name: str, environment: gymnasium.Env) -> None:
+    """What goes wrong in it is told, but must not take the place of what the environment was for."""
+    try:
+        environment.close()
+    except Exception as error:
+        what = f"{type(error).__name__}: {error}"
+        warnings.warn(f"environment {name}: close() raised {what}", RuntimeWarning, stacklevel=2)
 
 
 class Source:
@@ -255,7 +266,8 @@ class Source:
         if name != self.name:
             return None
         sizes = {"observation_dim": self.observations.size, "float32": self.observations.float32}
-        return {"id": self.name, **sizes, **self.actions.spec()}
+        layout = _layout.described(self.observations.layout, self.actions.layout)
+        return {"id": self.name, **sizes, "layout": layout, **self.actions.spec()}
 
     def make(self, name: str) -> Lane | None:
         return self.lane(Lane) if name == self.name else None
@@ -277,8 +289,14 @@ class Source:
     def close(self) -> None:
         """Closes what was made here, not what was given."""
         for environment in self._made:
-            environment.close()
+            close(self.name, environment)
         self._made, self._idle = [], []
+
+
+def _unknown(name: str, error: Exception) -> InputError:
+    near = difflib.get_close_matches(name, _core.environment_ids(), 1)
+    own = f"agail's own: did you mean '{near[0]}'?" if near else "`agail envs` lists agail's own"
+    return InputError(f"no environment '{name}': {error}; {own}")
 
 
 class Registered:
@@ -297,10 +315,13 @@ class Registered:
                     importlib.import_module(module)
             except ImportError as error:
                 raise InputError(f"environment {name}: {error}") from error
+            except Exception as error:
+                what = f"{type(error).__name__}: {error}"
+                raise InputError(f"environment {name}: importing {module} raised {what}") from error
             try:
                 gymnasium.spec(registered)
-            except gymnasium.error.Error:
-                return None
+            except gymnasium.error.Error as error:
+                raise _unknown(name, error) from error
             try:
                 self._sources[name] = Source(name)
             except InputError:

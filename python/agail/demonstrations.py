@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import operator
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agail import _core
+from agail._arguments import MOST_SEED, whole
 from agail._core import InputError
 from agail.formats import d4rl, imitation, lerobot
 from agail.formats.arrays import arrays_of, core_of
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from imitation.data.types import Trajectory
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # arrays have no one answer to ==
 class Episode:
     """One trajectory of T steps."""
 
@@ -67,8 +69,9 @@ class Demonstrations(Sequence[Episode]):
     ) -> Demonstrations:
         """From arrays with one row a step, episode after episode.
 
-        observations (N, D); actions (N, A), or (N,) for one dimension, discrete if they are integers;
-        a missing entry is NaN, or False in action_available (N,) or (N, A); None: all are missing.
+        observations (N, D); actions (N, A), or (N,) for one dimension, discrete if they are integers,
+        and then counted from 0 whatever the start of the environment's Discrete space is; a missing
+        entry is NaN, or False in action_available (N,) or (N, A); None: all are missing.
         episodes (N,): a number that names each row's episode; without it episodes end where
         terminations or truncations (N,) say so. Without next_observations (N, D) the last row of an
         episode is its final state, and that row's action and reward are not used. environment: the
@@ -176,6 +179,7 @@ class Demonstrations(Sequence[Episode]):
         whole action channels (`dimension` first, if it is given). With one seed a larger share's
         mask contains a smaller one's.
         """
+        seed = whole("seed", seed, 0, MOST_SEED)
         return Demonstrations(self._core.masked(missing, pattern, seed, dimension))
 
     @property
@@ -211,9 +215,14 @@ class Demonstrations(Sequence[Episode]):
     def __len__(self) -> int:
         return len(self._core)
 
-    def __getitem__(self, index: Any) -> Any:
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> Episode: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Episode]: ...
+    def __getitem__(self, index: SupportsIndex | slice) -> Episode | list[Episode]:
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
+        index = operator.index(index)
         position = index + len(self) if index < 0 else index
         if not 0 <= position < len(self):
             raise IndexError(f"episode {index} of {len(self)}")

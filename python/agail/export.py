@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from pathlib import Path
@@ -10,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from agail import _core
-from agail._core import InputError, Policy
-from agail._extension import Parser, missing, run
+from agail._core import Policy
+from agail._extension import Parser, missing, run, unwritten
 
 if TYPE_CHECKING:
     import onnx
@@ -71,7 +72,10 @@ def _build(policy: Policy) -> tuple[_Graph, list[tuple[str, Any, list[Any]]]]:
         if not last:
             graph.then("Tanh")
     if structure["discrete"]:
-        graph.then("ArgMax", to="action", axis=1, keepdims=0)
+        (start,) = structure.get("layout", {}).get("action_start", [0])
+        graph.then("ArgMax", to=None if start else "action", axis=1, keepdims=0)
+        if start:
+            graph.then("Add", graph.constant("action.start", np.int64(start)), to="action")
         logits = ("logits", TensorProto.FLOAT, ["n", structure["actions"]])
         return graph, [("action", TensorProto.INT64, ["n"]), logits]
     from onnx import helper
@@ -97,8 +101,9 @@ def _build(policy: Policy) -> tuple[_Graph, list[tuple[str, Any, list[Any]]]]:
 def to_onnx(policy: Policy) -> onnx.ModelProto:
     """One graph with normalisation and network.
 
-    Input: observation, float32 (n, observation_dim), as the environment gives it. Outputs: action,
-    what predict() gives (float32 (n, action_dim), or int64 (n,)); log_std and mean (continuous: of
+    Input: observation, float32 (n, observation_dim), the environment's numbers in a row (of a
+    Discrete space one-hot). Outputs: action, what predict() gives (float32 (n, action_dim), in a row
+    whatever the shape of the space is, or int64 (n,)); log_std and mean (continuous: of
     the Gaussian before it is clipped to the bounds), or logits. Metadata: environment, method,
     timesteps, settings, structure.
     """
@@ -127,7 +132,10 @@ def to_onnx(policy: Policy) -> onnx.ModelProto:
 
 
 def export(policy: Policy, path: str | os.PathLike[str]) -> None:
-    """Writes to_onnx(policy) to a file: whole or not at all."""
+    """Writes to_onnx(policy) to a file: whole or not at all.
+
+    InputError if it cannot be created there; RuntimeError if the disk is full.
+    """
     data = to_onnx(policy).SerializeToString()
     path = Path(path)
     part = path.with_name(f".{path.name}.tmp")
@@ -135,9 +143,10 @@ def export(policy: Policy, path: str | os.PathLike[str]) -> None:
         part.write_bytes(data)
         part.replace(path)
     except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror}); give another --out"
-        ) from error
+        raise unwritten(path, error, "give another --out") from error
+    finally:
+        with contextlib.suppress(OSError):  # none is there
+            part.unlink()
 
 
 def main() -> None:

@@ -82,22 +82,34 @@ class NativeVectorEnv(VectorEnv[np.ndarray, Any, np.ndarray]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._dtype = self.single_observation_space.dtype
-        self._seeded = False
+        self._seeded = np.zeros(num_envs, bool)
+
+    def _one_each(self, what: str, count: int) -> None:
+        if count != self.num_envs:
+            raise InputError(
+                f"reset() got {count} {what} for {self.num_envs} environments; one each"
+            )
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        seeds: list[int] = []
-        if isinstance(seed, list | tuple):
-            own = [np.random.default_rng(each) for each in seed]
-            seeds = [int(random.integers(2**63)) for random in own]
-        elif seed is not None or not self._seeded:
-            super().reset(seed=seed)
-            seeds = [int(number) for number in self.np_random.integers(2**63, size=self.num_envs)]
-        self._seeded = True
         mask = (options or {}).get("reset_mask")
-        chosen = [True] * self.num_envs if mask is None else np.asarray(mask, bool).tolist()
-        return self._native.reset(seeds, chosen).astype(self._dtype, copy=False), {}
+        chosen = np.ones(self.num_envs, bool) if mask is None else np.asarray(mask, bool)
+        self._one_each("entries of reset_mask", len(chosen))
+        begin = chosen & ~self._seeded  # those that do not go on with the seed that they had
+        seeds = [0] * self.num_envs
+        if isinstance(seed, list | tuple):
+            self._one_each("seeds", len(seed))
+            begin |= chosen & np.array([each is not None for each in seed])
+            seeds = [int(np.random.default_rng(each).integers(2**63)) for each in seed]
+        elif seed is not None or begin.any():
+            super().reset(seed=seed)
+            begin |= chosen & (seed is not None)
+            seeds = [int(number) for number in self.np_random.integers(2**63, size=self.num_envs)]
+        self._seeded |= begin
+        self._native.reset(seeds, begin.tolist())
+        observations = self._native.reset([], (chosen & ~begin).tolist())
+        return observations.astype(self._dtype, copy=False), {}
 
     def step(
         self, actions: Any

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agail._core import InputError
-from agail._extension import Parser, missing, run
+from agail._extension import Parser, missing, run, unwritten
 from agail.statistics import bootstrap_interval, iqm, share_of
 from agail.training import Run
 
@@ -108,7 +108,8 @@ def find_runs(folders: Iterable[str | Path]) -> tuple[list[Run], list[tuple[Path
             try:
                 each = Run(path)
                 _ = each.settings, each.summary
-                if not any(len(column) for column in each.metrics.values()):
+                # bc learns without updates.
+                if not any(len(column) for column in each.metrics.values()) and not each.finished:
                     raise ValueError("no update has ended yet")
                 runs.append(each)
             except (OSError, ValueError) as error:
@@ -367,7 +368,7 @@ def main() -> None:
                     figure.savefig(Path(options.figures) / f"{name}.svg")
                     figure.savefig(Path(options.figures) / f"{name}.png", dpi=150)
         except OSError as error:
-            raise InputError(f"{error.filename}: cannot be written ({error.strerror})") from error
+            raise unwritten(error.filename or options.out, error, "give another folder") from error
         print(f"{options.out}: {_count(runs, 'run')}, {_count(figures, 'figure')}")
 
     run(work)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agail import _core, _recording
+from agail._arguments import MOST_EPISODES, MOST_SEED, whole
 from agail._core import InputError, Policy
 from agail._recording import Predictor
 from agail._source import EnvironmentLike, Registered, Source, source_of
@@ -73,7 +74,7 @@ class Run:
         return f"<Run {what + ', ' if what else ''}{state}, in {self.folder}>"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # arrays have no one answer to ==
 class Evaluation:
     """Episodes of a policy."""
 
@@ -109,16 +110,23 @@ def _assignments(settings: Mapping[str, Any]) -> list[str]:
 def _threads(threads: int | None, source: Source | Registered, name: str) -> int:
     """All cores for what is built in; Python runs one environment at a time anyway."""
     if threads is not None:
-        if not 1 <= threads <= 4096:
-            raise InputError(f"threads = {threads} should be from 1 to 4096")
-        return threads
+        return whole("threads", threads, 1, 4096)
     return _core.default_threads() if source.spec(name) is None else 1
 
 
-def _whole(name: str, value: int, least: int) -> int:
-    if not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{name} = {value!r} should be a whole number of at least {least}")
-    return int(value)
+def _fitting_batch(name: str, preset: str, assignments: list[str], lanes: int) -> list[str]:
+    """A batch that so many lanes can share, where the user has not said how large it is to be."""
+    if preset.endswith(".toml") or any(each.startswith("run.batch_steps=") for each in assignments):
+        return []
+    share = max(1, round(_core.batch_steps(name, preset, assignments) / lanes))
+    return [f"run.batch_steps={lanes * share}"]
+
+
+def _raise_again(caught: int) -> None:
+    """A signal that the core noted: to whoever handles it. Python's own handler of SIGINT raises."""
+    if caught:
+        signal.raise_signal(caught)
+        raise KeyboardInterrupt
 
 
 def train(
@@ -129,7 +137,7 @@ def train(
     out: str | os.PathLike[str] | None = None,
     timesteps: int | None = None,
     seed: int = 0,
-    preset: str = "default",
+    preset: str | os.PathLike[str] = "default",
     threads: int | None = None,
     lanes: int | None = None,
     resume: bool = False,
@@ -141,10 +149,12 @@ def train(
 
     environment: an id (built in, or registered with Gymnasium), a gymnasium.Env, a SyncVectorEnv or
     AsyncVectorEnv, or a function that makes an environment.
-    demonstrations: a Demonstrations, or what Demonstrations.load() takes; not for method "trpo".
+    demonstrations: a Demonstrations, or what Demonstrations.load() takes; method "trpo" does not use
+    them.
     method: "agail", "gail", "state-gail", "bc", "bco" or "trpo".
     out: the run's folder; without it a temporary one, which goes when the Run does.
-    timesteps, lanes: short for the settings run.timesteps and run.lanes.
+    timesteps, lanes: short for the settings run.timesteps and run.lanes. Where the lanes come from a
+    vector environment, run.batch_steps is the nearest multiple of them, unless it is given.
     preset: "default", "paper" or a .toml file; settings: any setting of docs/settings.md, as
     trpo={"max_kl": 0.02} or **{"trpo.max_kl": 0.02}.
     resume: go on with the run in `out`.
@@ -155,7 +165,7 @@ def train(
     Ctrl-C saves a checkpoint and raises KeyboardInterrupt; resume=True goes on. InputError (a
     ValueError) for anything that is wrong with the arguments or the environment.
     """
-    temporary = None
+    temporary, preset = None, os.fspath(preset)
     if out is None:
         if resume:
             raise InputError("resume=True goes on with a run; give its folder as out")
@@ -166,19 +176,21 @@ def train(
     if demonstrations is not None and not isinstance(demonstrations, Demonstrations):
         demonstrations = Demonstrations.load(demonstrations)
     name, source = source_of(environment)
+    assignments = _assignments(settings)
     try:
         if lanes is None and isinstance(source, Source) and source.lanes > 1:
             lanes = source.lanes
+            assignments += _fitting_batch(name, preset, assignments, lanes)
         caught, _ = _core.train(
             name,
             method,
             None if demonstrations is None else demonstrations._core,
             os.fspath(out),
             preset,
-            _assignments(settings),
-            0 if timesteps is None else _whole("timesteps", timesteps, 1),
-            0 if lanes is None else _whole("lanes", lanes, 1),
-            _whole("seed", seed, 0),
+            assignments,
+            0 if timesteps is None else whole("timesteps", timesteps, 1),
+            0 if lanes is None else whole("lanes", lanes, 1),
+            whole("seed", seed, 0, MOST_SEED),
             _threads(threads, source, name),
             resume,
             progress,
@@ -187,10 +199,7 @@ def train(
         )
     finally:
         source.close()
-    if caught:
-        # To whoever handles it: Python's own handler raises KeyboardInterrupt for SIGINT.
-        signal.raise_signal(caught)
-        raise KeyboardInterrupt
+    _raise_again(caught)
     run = Run(out)
     run._keep = temporary
     return run
@@ -214,16 +223,18 @@ def _play(
     """_core.evaluate or _core.record, in environments that are closed afterwards."""
     name, source = _environment_for(policy, environment)
     try:
-        return work(
+        caught, result = work(
             policy,
-            _whole("episodes", episodes, 1),
-            _whole("seed", seed, 0),
+            whole("episodes", episodes, 1, MOST_EPISODES),
+            whole("seed", seed, 0, MOST_SEED),
             not deterministic,
             _threads(threads, source, name),
             source,
         )
     finally:
         source.close()
+    _raise_again(caught)
+    return result
 
 
 def evaluate(
@@ -265,7 +276,7 @@ def record(
             raise InputError(f"{policy!r} is no policy: it has no predict()")
         if environment is None:
             raise InputError("record() of such a policy needs the environment to record in")
-        counts = _whole("episodes", episodes, 1), _whole("seed", seed, 0)
+        counts = whole("episodes", episodes, 1, MOST_EPISODES), whole("seed", seed, 0, MOST_SEED)
         return Demonstrations(_recording.record(policy, environment, *counts, deterministic))
     policy = _policy(policy)
     core = _play(_core.record, policy, episodes, environment, seed, deterministic, threads)

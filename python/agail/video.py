@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import os
 import re
-from argparse import Namespace
 from collections.abc import Iterator
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import gymnasium
 
+from agail._arguments import MOST_EPISODES, whole
 from agail._core import InputError, Policy
 from agail._extension import Parser, run
 from agail._pictures import FORMATS, possible_rate, write_film
 from agail._playing import Player, Side, filmed, replayed
 from agail._rendering import make_drawn
+from agail._source import close
 from agail.demonstrations import Demonstrations
 
 if TYPE_CHECKING:
@@ -40,9 +42,11 @@ def film(
     out: .mp4 or .gif. environment: a Gymnasium id; default: the policy's. Episode i is reset with
     seed + i. size: width and height of a picture, even; default: as the environment draws. fps: frames
     a second; at the environment's own speed, so that steps are left out. demonstrations: episode i
-    is shown on the left of a policy that begins in its first state.
+    is shown on the left of a policy that begins in its first state. InputError for what cannot be
+    filmed; OSError if the disk is full.
     """
     out = Path(out)
+    _check(policy, out, episodes, seed, size, fps, demonstrations)
     name = environment or policy.environment
     player = Player(policy, name, size)
     speed = float(player.environment.metadata.get("render_fps") or 30)
@@ -72,45 +76,49 @@ def film(
         write_film(out, frames(), rate)
     finally:
         for each in environments:
-            each.close()
+            close(name, each)
     return returns
+
+
+def _check(
+    policy: Policy,
+    out: Path,
+    episodes: int,
+    seed: int,
+    size: tuple[int, int] | None,
+    fps: float,
+    demonstrations: Demonstrations | None,
+) -> None:
+    """InputError, before anything is opened."""
+    if out.suffix not in FORMATS:
+        raise InputError(f"{out}: the name of a film should end in {' or '.join(FORMATS)}")
+    whole("episodes", episodes, 1, MOST_EPISODES)
+    whole("seed", seed, 0, 2**31 - 1)
+    if not (isinstance(fps, Real) and 1 <= fps <= 120):
+        raise InputError(f"fps = {fps!r} should be from 1 to 120")
+    if size and not all(64 <= side <= 4096 and side % 2 == 0 for side in size):
+        raise InputError(
+            f"size {'x'.join(map(str, size))}: should be width x height, even and from 64 to 4096, as "
+            "640x480"
+        )
+    if demonstrations is None:
+        return
+    if demonstrations.observation_dim != policy.observation_dim:
+        raise InputError(
+            f"the demonstrations have observations of {demonstrations.observation_dim} numbers, the "
+            f"policy's have {policy.observation_dim}; give demonstrations of {policy.environment}"
+        )
+    if len(demonstrations) < episodes:
+        raise InputError(
+            f"episodes = {episodes}, but there are {len(demonstrations)} demonstrations; give fewer"
+        )
 
 
 def _size(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text)
-    size = (int(match[1]), int(match[2])) if match else (0, 0)
-    if not all(64 <= side <= 4096 and side % 2 == 0 for side in size):
-        raise InputError(
-            f"--size {text}: should be width x height, even and from 64 to 4096, as 640x480"
-        )
-    return size
-
-
-def _check(options: Namespace) -> None:
-    if Path(options.out).suffix not in FORMATS:
-        raise InputError(f"--out {options.out}: the name should end in {' or '.join(FORMATS)}")
-    if options.episodes < 1:
-        raise InputError(f"--episodes {options.episodes}: should be at least 1")
-    if not 0 <= options.seed < 2**31:
-        raise InputError(f"--seed {options.seed}: should be from 0 to 2147483647")
-    if not 1 <= options.fps <= 120:
-        raise InputError(f"--fps {options.fps:g}: should be from 1 to 120")
-
-
-def _demonstrations(options: Namespace, policy: Policy) -> Demonstrations | None:
-    if options.demos is None:
-        return None
-    demos = Demonstrations.load(options.demos)
-    if demos.observation_dim != policy.observation_dim:
-        raise InputError(
-            f"{options.demos}: its observations have {demos.observation_dim} numbers, the policy's "
-            f"{policy.observation_dim}; give demonstrations of {policy.environment}"
-        )
-    if len(demos) < options.episodes:
-        raise InputError(
-            f"--episodes {options.episodes}: there are {len(demos)} in {options.demos}; give fewer"
-        )
-    return demos
+    if not match:
+        raise InputError(f"--size {text}: should be width x height, as 640x480")
+    return int(match[1]), int(match[2])
 
 
 def main() -> None:
@@ -127,7 +135,6 @@ def main() -> None:
 
     def work() -> None:
         gymnasium.logger.min_level = gymnasium.logger.ERROR  # if the version is old, it is meant
-        _check(options)
         size = _size(options.size) if options.size else None
         policy = Policy.load(options.policy)
         returns = film(
@@ -138,7 +145,7 @@ def main() -> None:
             seed=options.seed,
             size=size,
             fps=options.fps,
-            demonstrations=_demonstrations(options, policy),
+            demonstrations=Demonstrations.load(options.demos) if options.demos else None,
         )
         shown = ", ".join(f"{each:,.1f}" for each in returns)
         print(f"{options.out}: {len(returns)} episode{'s'[: len(returns) > 1]}, return {shown}")

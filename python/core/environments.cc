@@ -35,8 +35,8 @@ nb::dict describe(const std::string& id) {
 // Environments of one kind, each with episodes of its own. Arrays have one row an environment.
 class NativeEnvironments {
  public:
-  NativeEnvironments(const std::string& id, int count, int threads) : pool_(threads) {
-    if (count < 1) throw InputError("num_envs is " + std::to_string(count) + "; at least 1");
+  NativeEnvironments(const std::string& id, int count, int threads)
+      : pool_(threads_of(count, threads)) {
     for (int i = 0; i < count; ++i) lanes_.push_back({make_environment(id)});
     const EnvironmentSpec& spec = lanes_.front().environment->spec();
     dim_ = static_cast<std::size_t>(spec.observation_dim);
@@ -106,6 +106,14 @@ class NativeEnvironments {
     bool ended = false;
   };
 
+  // InputError if there can be no such environments.
+  static int threads_of(int count, int threads) {
+    if (count < 1) throw InputError("num_envs is " + std::to_string(count) + "; at least 1");
+    if (threads < 1 || threads > 4096)
+      throw InputError("threads = " + std::to_string(threads) + " should be from 1 to 4096");
+    return threads;
+  }
+
   static void start(Lane& lane) {
     RandomStream random(lane.seed, Purpose::kReset, 0, lane.episode++);
     lane.environment->reset(random);
@@ -123,10 +131,13 @@ class NativeEnvironments {
       throw InputError("step() takes " + std::to_string(lanes_.size() * action_dim_) +
                        " numbers of actions, not " + std::to_string(actions.size()));
     if (discrete_actions_ == 0) return;
-    for (std::size_t i = 0; i < actions.size(); ++i)
-      if (!(actions.data()[i] >= 0 && actions.data()[i] < static_cast<float>(discrete_actions_)))
-        throw InputError("there is no action " + std::to_string(actions.data()[i]) +
-                         "; they are 0 to " + std::to_string(discrete_actions_ - 1));
+    for (std::size_t i = 0; i < actions.size(); ++i) {
+      const float action = actions.data()[i];
+      if (!(action >= 0 && action < static_cast<float>(discrete_actions_) &&
+            action == std::floor(action)))
+        throw InputError("there is no action " + std::to_string(action) + "; they are 0 to " +
+                         std::to_string(discrete_actions_ - 1));
+    }
   }
 
   template <class F>

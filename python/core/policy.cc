@@ -2,6 +2,7 @@
 #include "policy.h"
 
 #include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
@@ -13,6 +14,7 @@
 #include <span>
 #include <string_view>
 
+#include "agail/base/atomic_file.h"
 #include "agail/base/error.h"
 #include "bind.h"
 
@@ -68,8 +70,9 @@ class NumPy {
     return empty_(shape, types_[type]);
   }
 
+  // A copy, as only a new array is sure to be aligned.
   static nb::object as_float64(const nb::object& numbers) {
-    return nb::module_::import_("numpy").attr("ascontiguousarray")(numbers, "float64");
+    return nb::module_::import_("numpy").attr("array")(numbers, "float64", nb::arg("order") = "C");
   }
 
  private:
@@ -90,13 +93,39 @@ class Policy {
   const SavedPolicy& saved() const { return policy_; }
 
   // Names the random numbers of stochastic actions from here on.
-  void seed(std::uint64_t seed) {
-    seed_ = seed;
+  void seed(const nb::object& seed) {
+    std::uint64_t number = 0;
+    if (!nb::try_cast(seed, number))
+      throw InputError("seed = " + std::string(nb::repr(seed).c_str()) +
+                       " should be a whole number of at least 0 and below 2**64");
+    seed_ = number;
     draws_ = 0;
   }
 
   nb::tuple predict(const nb::object& observation, const nb::object& state, const nb::object&,
                     bool deterministic) {
+    if (policy_.info().layout.empty())
+      return nb::make_tuple(flat_actions(observation, deterministic), state);
+    const nb::object layout =
+        nb::module_::import_("agail._layout")
+            .attr("PolicyLayout")(policy_.info().layout, policy_.observation_dim(),
+                                  policy_.action().dim, policy_.action().discrete);
+    const nb::object found = layout.attr("rows")(observation);
+    const nb::object rows = found[0], single = found[1];
+    const nb::object actions = flat_actions(rows, deterministic);
+    return nb::make_tuple(layout.attr("own_actions")(actions, single), state);
+  }
+
+ private:
+  static std::string text_of(std::span<const Py_ssize_t> shape) {
+    std::string text = "(";
+    for (std::size_t i = 0; i < shape.size(); ++i)
+      text += (i == 0 ? "" : ", ") + std::to_string(shape[i]);
+    return text + (shape.size() == 1 ? ",)" : ")");
+  }
+
+  // Of one observation or a batch, all numbers in a row and counted from 0.
+  nb::object flat_actions(const nb::object& observation, bool deterministic) {
     std::optional<Buffer> input(std::in_place, observation, "d");
     if (!input->valid()) input.emplace(NumPy::as_float64(observation), "d");
     const std::span<const Py_ssize_t> shape = input->shape();
@@ -113,21 +142,13 @@ class Policy {
       const nb::object actions =
           numpy_.empty(single ? nb::make_tuple() : nb::make_tuple(n), NumPy::kInt64);
       std::copy(indices.begin(), indices.end(), Buffer(actions, "l").data<std::int64_t>());
-      return nb::make_tuple(actions, state);
+      return actions;
     }
     const int width = policy_.action().dim;
     const nb::object actions =
         numpy_.empty(single ? nb::make_tuple(width) : nb::make_tuple(n, width), NumPy::kFloat32);
     act(rows, n, Buffer(actions, "f").data<float>(), deterministic);
-    return nb::make_tuple(actions, state);
-  }
-
- private:
-  static std::string text_of(std::span<const Py_ssize_t> shape) {
-    std::string text = "(";
-    for (std::size_t i = 0; i < shape.size(); ++i)
-      text += (i == 0 ? "" : ", ") + std::to_string(shape[i]);
-    return text + (shape.size() == 1 ? ",)" : ")");
+    return actions;
   }
 
   void act(const double* observations, std::size_t n, float* actions, bool deterministic) {
@@ -217,12 +238,14 @@ constexpr const char* kPredictSignature =
     "tuple[numpy.typing.NDArray[typing.Any], object]";
 
 constexpr const char* kPredictHelp =
-    R"(The action for one observation (shape (observation_dim,)) or a batch (n, observation_dim).
+    R"(The action for one observation of the environment, or for a batch of them.
 
 Returns (action, state) as stable-baselines3 does; state comes back as it was given, these policies have none, and
-episode_start is not used. Continuous actions are float32, (action_dim,) or (n, action_dim), within the bounds; discrete
-ones int64, () or (n,). The mode, or a sample if not deterministic. Observations are normalised here. A batch gives the
-same bits as its rows one by one. InputError (a ValueError) for other shapes.)";
+episode_start is not used. Observations and actions are as the environment has them: a batch is (n, *shape), (n,) of a
+Discrete space. Observations of shape (observation_dim,) or (n, observation_dim) will do for a Box of any shape, one-hot
+rows (n, observation_dim) for a Discrete space. Continuous actions are float32, within the bounds; discrete ones int64.
+The mode, or a sample if not deterministic. Observations are normalised here. A batch gives the same bits as its rows
+one by one. InputError (a ValueError) for other shapes.)";
 
 }  // namespace
 
@@ -237,13 +260,15 @@ void bind_policy(nb::module_& module) {
       .def(
           "save",
           [](const Policy& policy, const std::filesystem::path& path) {
+            create_output_folder(path.parent_path());
             policy.saved().save(path);
           },
-          nb::arg("path"), "Writes one .safetensors file.")
+          nb::arg("path"), "Writes one .safetensors file, and makes its folder if there is none.")
       .def("predict", &Policy::predict, nb::arg("observation"), nb::arg("state") = nb::none(),
            nb::arg("episode_start") = nb::none(), nb::arg("deterministic") = true,
            nb::sig(kPredictSignature), kPredictHelp)
-      .def("seed", &Policy::seed, nb::arg("seed"),
+      .def("seed", &Policy::seed, nb::arg("seed").none(),
+           nb::sig("def seed(self, seed: int) -> None"),
            "Names the random numbers of stochastic actions from here on.")
       .def("tensors", &tensors,
            nb::sig("def tensors(self) -> dict[str, numpy.typing.NDArray[typing.Any]]"),

@@ -1,9 +1,11 @@
 #include "python_environment.h"
 
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
+#include <cstdio>
 
 #include "arrays.h"
 #include "errors.h"
@@ -30,6 +32,7 @@ EnvironmentSpec spec_from(const nb::dict& dict) {
   spec.id = nb::cast<std::string>(dict["id"]);
   spec.observation_dim = nb::cast<int>(dict["observation_dim"]);
   spec.observation_is_float32 = nb::cast<bool>(dict["float32"]);
+  spec.layout = nb::cast<decltype(spec.layout)>(dict["layout"]);
   spec.action.discrete = dict.contains("n");
   if (spec.action.discrete) {
     spec.action.dim = 1;
@@ -104,12 +107,18 @@ class PythonEnvironment final : public Environment {
       throw InputError("environment " + spec().id + ": " + call + "() returned an observation of " +
                        std::to_string(array.size()) + " numbers, its observation_space has " +
                        std::to_string(observation_.size()));
-    for (std::size_t i = 0; i < observation_.size(); ++i)
-      if (!std::isfinite(static_cast<float>(array.data()[i])))
-        throw InputError("environment " + spec().id + ": " + call + "() returned an observation " +
-                         "with " + std::to_string(array.data()[i]) + " at index " +
-                         std::to_string(i) + " after " + std::to_string(elapsed_steps()) +
-                         " steps of an episode; observations must be finite");
+    for (std::size_t i = 0; i < observation_.size(); ++i) {
+      const double number = array.data()[i];
+      if (std::isfinite(static_cast<float>(number))) continue;
+      char digits[32];
+      std::snprintf(digits, sizeof digits, "%g", number);
+      throw InputError("environment " + spec().id + ": " + call +
+                       "() returned an observation with " + digits + " at index " +
+                       std::to_string(i) + " after " + std::to_string(elapsed_steps()) +
+                       " steps of an episode; " +
+                       (std::isfinite(number) ? "that is too large for float32, use other units"
+                                              : "observations must be finite"));
+    }
     std::copy_n(array.data(), array.size(), observation_.data());
   }
 

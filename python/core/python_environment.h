@@ -8,7 +8,8 @@
 namespace agail {
 
 // Environments by way of a Python object (agail._source.Source) with
-//   spec(id) -> None, or a dict: id, observation_dim, float32, and low, high (Box) or n (Discrete)
+//   spec(id) -> None, or a dict: id, observation_dim, float32, layout (agail/_layout.py), and low,
+//     high (Box) or n (Discrete)
 //   make(id) -> None, or an object (agail._source.Lane) with
 //     action    float32 array that holds the action when step() is called
 //     reset(seed) -> observation        float64, one-dimensional

@@ -4,7 +4,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "agail/base/interrupt.h"
 #include "agail/base/thread_pool.h"
+#include "agail/config/resolve.h"
 #include "agail/train/evaluation.h"
 #include "agail/train/run.h"
 #include "agail/train/run_log.h"
@@ -89,18 +91,38 @@ std::pair<int, bool> train(const std::string& environment, const std::string& me
   return {outcome.signal, outcome.stopped};
 }
 
-nb::dict evaluate_policy(const nb::object& policy, Index episodes, std::uint64_t seed,
-                         bool stochastic, int threads, const nb::object& source) {
+std::int64_t batch_steps(const std::string& environment, const std::string& preset,
+                         const std::vector<std::string>& assignments) {
+  return resolve_settings({preset, environment, assignments}).run.batch_steps;
+}
+
+// Runs episodes(stops_on_signals) outside of Python. Returns (0, in_python(what it returned)), or
+// (the signal that came meanwhile, None). A run whose callback evaluates answers its signals
+// itself, when it has saved a checkpoint.
+template <class Episodes, class InPython>
+nb::tuple until_a_signal(const nb::object& source, Episodes&& episodes, InPython&& in_python) {
   PythonSource environments(source);
-  const SavedPolicy& saved = saved_policy(policy);
+  const InterruptGuard guard;
+  try {
+    auto result = [&] {
+      const OutsidePython outside(environments);
+      return episodes(guard.alone());
+    }();
+    if (!guard.alone() || interrupted() == 0)
+      return nb::make_tuple(0, in_python(std::move(result)));
+  } catch (const EpisodesInterrupted&) {
+    // There is no result.
+  }
+  return nb::make_tuple(interrupted(), nb::none());
+}
+
+struct Evaluated {
+  Evaluation evaluation;
   std::pair<double, double> interval;
-  const Evaluation evaluation = [&] {
-    const OutsidePython outside(environments);
-    ThreadPool pool(threads);
-    Evaluation result = evaluate(saved, episodes, seed, stochastic, pool);
-    interval = bootstrap_interval(result.returns, seed);
-    return result;
-  }();
+};
+
+nb::dict dict_of(const Evaluated& evaluated) {
+  const Evaluation& evaluation = evaluated.evaluation;
   nb::dict result;
   result["returns"] = copy_array<double>(evaluation.returns.data(), {evaluation.returns.size()});
   result["lengths"] =
@@ -108,17 +130,31 @@ nb::dict evaluate_policy(const nb::object& policy, Index episodes, std::uint64_t
   result["diverged"] = evaluation.diverged;
   result["mean_return"] = evaluation.mean_return();
   result["standard_error"] = evaluation.standard_error();
-  result["confidence_interval_95"] = interval;
+  result["confidence_interval_95"] = evaluated.interval;
   return result;
 }
 
-Demonstrations record_policy(const nb::object& policy, Index episodes, std::uint64_t seed,
-                             bool stochastic, int threads, const nb::object& source) {
-  PythonSource environments(source);
+nb::tuple evaluate_policy(const nb::object& policy, Index episodes, std::uint64_t seed,
+                          bool stochastic, int threads, const nb::object& source) {
   const SavedPolicy& saved = saved_policy(policy);
-  const OutsidePython outside(environments);
-  ThreadPool pool(threads);
-  return record(saved, episodes, seed, stochastic, pool);
+  const auto evaluated = [&](bool stops_on_signals) {
+    ThreadPool pool(threads);
+    Evaluation evaluation = evaluate(saved, episodes, seed, stochastic, pool, stops_on_signals);
+    const auto interval = bootstrap_interval(evaluation.returns, seed);
+    return Evaluated{std::move(evaluation), interval};
+  };
+  return until_a_signal(source, evaluated, dict_of);
+}
+
+nb::tuple record_policy(const nb::object& policy, Index episodes, std::uint64_t seed,
+                        bool stochastic, int threads, const nb::object& source) {
+  const SavedPolicy& saved = saved_policy(policy);
+  const auto recorded = [&](bool stops_on_signals) {
+    ThreadPool pool(threads);
+    return record(saved, episodes, seed, stochastic, pool, stops_on_signals);
+  };
+  return until_a_signal(source, recorded,
+                        [](Demonstrations demos) { return nb::cast(std::move(demos)); });
 }
 
 int run_command_line(const std::vector<std::string>& words, const nb::object& source) {
@@ -136,6 +172,8 @@ int run_command_line(const std::vector<std::string>& words, const nb::object& so
 void bind_training(nb::module_& module) {
   module.def("methods", &training_methods);
   module.def("progress_columns", &progress_columns);
+  module.def("batch_steps", &batch_steps, nb::arg("environment"), nb::arg("preset"),
+             nb::arg("assignments"), "The setting run.batch_steps that these come to.");
   module.def("train", &train, nb::arg("environment"), nb::arg("method"),
              nb::arg("demonstrations").none(), nb::arg("out"), nb::arg("preset"),
              nb::arg("assignments"), nb::arg("timesteps"), nb::arg("lanes"), nb::arg("seed"),

@@ -51,6 +51,8 @@ TEST(Interrupt, SecondSignalGoesToTheHandlerThatWasThere) {
 TEST(Interrupt, GuardsOfSeveralThreadsShareIt) {
   auto first = std::make_unique<InterruptGuard>();
   auto second = std::make_unique<InterruptGuard>();
+  EXPECT_TRUE(first->alone());
+  EXPECT_FALSE(second->alone());
   std::raise(SIGTERM);
   first.reset();  // in the order in which they were built
   EXPECT_EQ(interrupted(), SIGTERM);

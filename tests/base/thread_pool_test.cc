@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -46,24 +47,52 @@ TEST(ThreadPool, ManySmallRunsSeeEachOthersResults) {
 TEST(ThreadPool, RethrowsTheLowestTasksExceptionAndGoesOn) {
   for (const int threads : {1, 3}) {
     ThreadPool pool(threads);
-    std::atomic<int> ran = 0;
+    std::vector<int> count(40);
     const auto fail = [&](int task, int) {
-      ++ran;
+      ++count[static_cast<std::size_t>(task)];
       if (task % 10 == 3) throw std::runtime_error("task " + std::to_string(task));
     };
     for (int round = 0; round < 50; ++round) {
-      ran = 0;
+      std::fill(count.begin(), count.end(), 0);
       try {
         pool.run(40, fail);
         FAIL();
       } catch (const std::runtime_error& error) {
         EXPECT_STREQ(error.what(), "task 3");
       }
-      EXPECT_EQ(ran, 40);
+      for (std::size_t task = 0; task < count.size(); ++task)
+        EXPECT_TRUE(count[task] == 1 || (task > 3 && count[task] == 0)) << task;
     }
-    ran = 0;
+    std::atomic<int> ran = 0;
     pool.run(10, [&](int, int) { ++ran; });
     EXPECT_EQ(ran, 10);
+  }
+}
+
+TEST(ThreadPool, LeavesOutTheTasksAboveAFailure) {
+  ThreadPool pool(1);
+  int ran = 0;
+  const auto fail = [&](int task, int) {
+    ++ran;
+    if (task == 2) throw std::runtime_error("no");
+  };
+  EXPECT_THROW(pool.run(1000, fail), std::runtime_error);
+  EXPECT_EQ(ran, 3);
+}
+
+TEST(ThreadPool, ATaskBelowAFailureHasTheLastWord) {
+  ThreadPool pool(2);
+  std::atomic<bool> failing = false;
+  try {
+    pool.run(2, [&](int task, int) {
+      if (task == 0) failing.wait(false);  // the other one fails first, or at once with it
+      failing = true;
+      failing.notify_all();
+      throw std::runtime_error("task " + std::to_string(task));
+    });
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "task 0");
   }
 }
 

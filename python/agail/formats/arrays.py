@@ -8,28 +8,28 @@ import numpy as np
 
 from agail import _core
 from agail._core import InputError
-from agail.formats import Arrays
+from agail.formats import Arrays, numbers
 
 
-def _column(name: str, value: Any, rows: int) -> list[float]:
+def _column(where: str, name: str, value: Any, rows: int) -> list[float]:
     if value is None:
         return []
-    array = np.asarray(value, np.float64)
-    if array.shape != (rows,):
+    array = numbers(where, name, value, (1,))
+    if len(array) != rows:
         raise InputError(f"{name} have the shape {array.shape}, the observations {rows} rows")
-    return array.tolist()
+    return array.astype(np.float64).tolist()
 
 
-def _actions(actions: Any, available: Any, rows: int) -> tuple[np.ndarray, bool]:
+def _actions(where: str, actions: Any, available: Any, rows: int) -> tuple[np.ndarray, bool]:
     """(N, A), missing entries NaN, and whether they are discrete."""
-    act = np.empty((rows, 0)) if actions is None else np.asarray(actions)
+    act = np.empty((rows, 0)) if actions is None else numbers(where, "actions", actions, (1, 2))
     discrete = act.ndim == 1 and np.issubdtype(act.dtype, np.integer)
     act = act.astype(np.float64)
     act = act[:, None] if act.ndim == 1 else act
-    if act.ndim != 2 or len(act) != rows:
+    if len(act) != rows:
         raise InputError(f"actions have the shape {act.shape}, the observations {rows} rows")
     if available is not None:
-        known = np.asarray(available, bool)
+        known = numbers(where, "action_available", available, (1, 2)).astype(bool)
         known = known[:, None] if known.ndim == 1 else known
         if known.shape not in ((rows, 1), act.shape):
             raise InputError(f"action_available has the shape {known.shape}, not {act.shape}")
@@ -39,24 +39,25 @@ def _actions(actions: Any, available: Any, rows: int) -> tuple[np.ndarray, bool]
 
 def core_of(arrays: Arrays, environment: str, where: str = "the arrays") -> _core.Demonstrations:
     """arrays: what Demonstrations.from_arrays() takes, by name; where: what to call them in messages."""
-    table = np.asarray(arrays["observations"])
-    if table.ndim != 2:
-        raise InputError(f"observations have the shape {table.shape}, not (steps, numbers)")
+    if environment.startswith("agail/") and environment[6:] in _core.environment_ids():
+        environment = environment[6:]  # the core knows its own by this name, and checks their sizes
+    table = numbers(where, "observations", arrays["observations"], (2,))
     rows = len(table)
-    act, discrete = _actions(arrays.get("actions"), arrays.get("action_available"), rows)
+    act, discrete = _actions(where, arrays.get("actions"), arrays.get("action_available"), rows)
     following = None
     if arrays.get("next_observations") is not None:
-        following = np.ascontiguousarray(arrays["next_observations"], np.float64)
+        following = numbers(where, "next_observations", arrays["next_observations"], (2,))
         if following.shape != table.shape:
             raise InputError(
                 f"next_observations have the shape {following.shape}, not {table.shape}"
             )
+        following = np.ascontiguousarray(following, np.float64)
     columns = ("rewards", "terminations", "truncations", "episodes")
     return _core.Demonstrations.from_table(
         np.ascontiguousarray(table, np.float64),
         np.ascontiguousarray(act),
         following,
-        *(_column(name, arrays.get(name), rows) for name in columns),
+        *(_column(where, name, arrays.get(name), rows) for name in columns),
         discrete,
         table.dtype == np.float32,
         environment,

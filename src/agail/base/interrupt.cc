@@ -27,7 +27,8 @@ extern "C" void note_signal(int signal) {
 
 InterruptGuard::InterruptGuard() {
   const std::lock_guard lock(mutex);
-  if (guards++ > 0) return;
+  alone_ = guards++ == 0;
+  if (!alone_) return;
   first_signal = 0;
   sigaction(SIGINT, nullptr, &old_int);
   sigaction(SIGTERM, nullptr, &old_term);

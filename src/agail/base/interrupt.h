@@ -15,9 +15,17 @@ class InterruptGuard {
   ~InterruptGuard();
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+  // Whether there was no other when it was built. Signals of a guard that was there before are for
+  // that one to answer.
+  bool alone() const { return alone_; }
+
+ private:
+  bool alone_ = false;
 };
 
-// The first signal noted while there are guards, else 0. The exit code is 128 + signal.
+// The first signal noted since a guard was built while there was no other; 0: none. It is still
+// known when the last guard has gone. The exit code is 128 + signal.
 int interrupted();
 
 }  // namespace agail

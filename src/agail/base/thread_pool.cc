@@ -68,6 +68,7 @@ void ThreadPool::run_erased(int tasks, Call call, void* function) {
   take_tasks(0);
   for (int left = 0; (left = unfinished_.load(std::memory_order_acquire)) != 0;)
     wait_while_equal(unfinished_, left);
+  failed_task_ = kNoTask;
   running_ = false;
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
 }
@@ -96,10 +97,12 @@ void ThreadPool::take_tasks(int worker) {
   int task = 0;
   while (take_task(task)) {
     try {
-      call_(function_, task, worker);
+      // Which exception comes out must not depend on who was first, so a lower task is never left
+      // out.
+      if (task < failed_task_) call_(function_, task, worker);
     } catch (...) {
       const std::lock_guard lock(failure_mutex_);
-      if (!failure_ || task < failed_task_) {
+      if (task < failed_task_) {
         failure_ = std::current_exception();
         failed_task_ = task;
       }

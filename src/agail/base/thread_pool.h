@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -27,8 +28,9 @@ class ThreadPool {
   int threads() const { return static_cast<int>(workers_.size()) + 1; }
 
   // Calls f(task, worker) once for each task in [0, tasks), worker in [0, threads()), and returns
-  // when all are done. Does not allocate. If tasks throw, the others still run, and the exception
-  // of the lowest task is thrown here. One run at a time, and none from inside a task.
+  // when all are done. Does not allocate. Once a task has thrown, those above it that have not
+  // begun are left out, those below it still run, and the exception of the lowest task is thrown
+  // here. One run at a time, and none from inside a task.
   template <class F>
   void run(int tasks, F&& f) {
     using Function = std::remove_reference_t<F>;
@@ -75,9 +77,10 @@ class ThreadPool {
   std::atomic<bool> stopping_{false};
   std::atomic<bool> running_{false};
 
+  static constexpr int kNoTask = std::numeric_limits<int>::max();
   std::mutex failure_mutex_;
   std::exception_ptr failure_;
-  int failed_task_ = 0;
+  std::atomic<int> failed_task_{kNoTask};  // the lowest; written with the mutex held
 
   std::vector<std::thread> workers_;
 };

@@ -113,15 +113,25 @@ class GridBuilder {
             .timesteps = static_cast<double>(settings.run.timesteps)};
   }
 
+  // Only where demonstrations are to be made, for which a record alone, as somebody may have
+  // published it, does not do: they are made from the policy.
   void add_expert(const std::string& environment, std::uint64_t seed) {
     const std::string id = environment + "-" + std::to_string(seed);
     const Settings settings = experiment_.expert_settings(environment);
-    expert_jobs_[environment].push_back(add(training_job(
-        experts_, id, environment + " expert seed " + std::to_string(seed), environment, settings,
-        train(environment, "trpo", kExpertPreset, seed, settings, experts_ / "runs" / id),
-        [=](const fs::path& record, const fs::path& run) {
-          write_expert_record(record, run, environment, seed);
-        })));
+    const fs::path run = experts_ / "runs" / id, policy = run / "policy_best.safetensors";
+    Job job = training_job(experts_, id, environment + " expert seed " + std::to_string(seed),
+                           environment, settings,
+                           train(environment, "trpo", kExpertPreset, seed, settings, run),
+                           [=](const fs::path& record, const fs::path& folder) {
+                             write_expert_record(record, folder, environment, seed);
+                           });
+    // While the policy is trained again, the record of the lost one must not say that it is done.
+    job.steps.insert(job.steps.begin(), [policy, record = job.results.front()] {
+      if (!is_there(policy)) fs::remove(record);
+      return 0;
+    });
+    job.results.push_back(policy);
+    expert_jobs_[environment].push_back(add(std::move(job)));
   }
 
   // A run that has left its record needs none; of its environment's, the tables need the record.

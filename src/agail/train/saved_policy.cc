@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "agail/base/atomic_file.h"
 #include "agail/base/crc32c.h"
@@ -115,6 +117,7 @@ TensorStore SavedPolicy::store() const {
     structure["action_low"] = bounds(action_.low);
     structure["action_high"] = bounds(action_.high);
   }
+  if (!info_.layout.empty()) structure["layout"] = info_.layout;
   store.metadata = {{"format", kFormat},          {"environment", info_.environment},
                     {"method", info_.method},     {"timesteps", std::to_string(info_.timesteps)},
                     {"settings", info_.settings}, {"structure", structure.dump()}};
@@ -134,6 +137,10 @@ std::string SavedPolicy::signature() const {
 std::vector<std::uint8_t> SavedPolicy::encode() const { return to_safetensors(store()); }
 
 void SavedPolicy::save(const std::filesystem::path& file) const {
+  if (!theta_.allFinite())
+    throw InputError(file.string() +
+                     " is not written: training diverged, the policy's weights are not finite; "
+                     "lower the learning rates");
   write_file_atomically(file, encode());
 }
 
@@ -173,10 +180,25 @@ SavedPolicy SavedPolicy::decode(std::span<const std::uint8_t> bytes, const std::
     constexpr std::int64_t kLargest = 1 << 20;
     const auto sensible = [](std::int64_t v) { return v >= 1 && v <= kLargest; };
     const auto dim = static_cast<std::size_t>(action.dim);
+    info.layout = structure.value("layout", info.layout);
+    const auto shape_fits = [&](const char* name, int size) {
+      const auto shape = info.layout.find(name);
+      if (shape == info.layout.end()) return true;
+      const std::vector<std::int64_t>& sides = shape->second;
+      return std::all_of(sides.begin(), sides.end(), sensible) &&
+             std::accumulate(sides.begin(), sides.end(), 1.0, std::multiplies<>()) == size;
+    };
+    const auto start_fits = [&](const char* name) {
+      const auto start = info.layout.find(name);
+      return start == info.layout.end() || start->second.size() == 1;
+    };
     if (!sensible(observation_dim) || !std::all_of(hidden.begin(), hidden.end(), sensible) ||
         !sensible(action.dim) ||
         (action.discrete ? !sensible(action.n) || action.dim != 1
-                         : action.low.size() != dim || action.high.size() != dim))
+                         : action.low.size() != dim || action.high.size() != dim) ||
+        !shape_fits("observation_shape", observation_dim) ||
+        !shape_fits("action_shape", action.dim) || !start_fits("observation_start") ||
+        !start_fits("action_start"))
       throw InputError(
           where +
           ": the structure in its metadata makes no sense; train or export the policy again");

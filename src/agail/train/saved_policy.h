@@ -8,6 +8,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -26,6 +27,9 @@ struct PolicyInfo {
   std::int64_t timesteps = 0;                        // of interaction that it learned from
   std::string settings;                              // TOML
   std::optional<double> demonstrations_mean_return;  // undiscounted, if the demonstrations told it
+  // Where the environment's own observations and actions are not as a policy has them, numbers in a
+  // row and counted from 0: its shapes and starts, as python/agail/_layout.py names them.
+  std::map<std::string, std::vector<std::int64_t>> layout{};
 };
 
 class SavedPolicy {

@@ -1,6 +1,7 @@
 """agail.Demonstrations: from files, arrays and Minari; masks; pickling."""
 
 import pickle
+from typing import get_overloads
 
 import numpy as np
 import pytest
@@ -39,6 +40,9 @@ def test_episodes(hopper_demos):
     with pytest.raises(IndexError):
         hopper_demos[6]
     assert "Hopper-v5" in repr(hopper_demos) and len(hopper_demos[:2]) == 2
+    assert episode in [episode] and episode not in hopper_demos and len({episode}) == 1
+    kinds = get_overloads(agail.Demonstrations.__getitem__)
+    assert [each.__annotations__["return"] for each in kinds] == ["Episode", "list[Episode]"]
 
 
 def test_mask(hopper_demos):
@@ -53,6 +57,8 @@ def test_mask(hopper_demos):
         hopper_demos.mask(0.5, "blok")
     with pytest.raises(ValueError, match="0 \\(none\\) to 1"):
         hopper_demos.mask(2)
+    with pytest.raises(agail.InputError, match="seed = -1"):
+        hopper_demos.mask(0.5, seed=-1)
 
 
 def test_from_arrays(arrays):
@@ -68,6 +74,8 @@ def test_from_arrays(arrays):
     assert not demos[1].available.any() and demos[2].available.all()
     arrays.pop("actions")
     assert agail.Demonstrations.from_arrays(**arrays).missing_ratio == 1
+    demos = agail.Demonstrations.from_arrays(**arrays, environment="agail/Hopper-v5")
+    assert demos.environment == "Hopper-v5" and demos.action_dim == 3
 
 
 def test_from_arrays_with_ends():
@@ -96,6 +104,12 @@ def test_from_arrays_with_ends():
         ({"observations": np.zeros((60, 12))}, "Hopper-v5"),
         ({"environment": "no id"}, "Gymnasium id"),
         ({"action_available": np.ones((60, 2))}, "action_available"),
+        ({"environment": "agail/Hopper-v5", "observations": np.zeros((60, 12))}, "Hopper-v5"),
+        ({"observations": [["a"]]}, "observations are <U1, not numbers"),
+        ({"observations": [[1, 2], [3]]}, "observations are no array of numbers"),
+        ({"actions": [[1], [1, 2]]}, "actions are no array of numbers"),
+        ({"episodes": ["a"] * 60}, "episodes are <U1"),
+        ({"observations": None}, "observations have the shape"),
     ],
     ids=str,
 )

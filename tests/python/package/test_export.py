@@ -1,6 +1,7 @@
 """agail export: onnxruntime gives the actions that the policy gives."""
 
 import json
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -9,15 +10,16 @@ import numpy as np
 import onnxruntime
 import pytest
 from small import train
+from test_gymnasium import Discretes
 
 import agail
 from agail import _core
 from agail.export import export
 
 
-def command(*words):
+def command(*words, **options):
     words = [str(Path(sys.executable).with_name("agail")), "export", *map(str, words)]
-    return subprocess.run(words, capture_output=True, text=True, timeout=300)
+    return subprocess.run(words, capture_output=True, text=True, timeout=300, **options)
 
 
 def observations(policy, count=10_000):
@@ -77,6 +79,32 @@ def test_wrong_input(hopper_run, tmp_path):
         assert done.returncode == 2 and done.stdout == ""
         assert len(done.stderr.splitlines()) == 1 and done.stderr.startswith("agail: "), done.stderr
     assert list(tmp_path.iterdir()) == []
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").touch()
+    for out in (tmp_path / "folder", tmp_path / "file" / "x"):
+        done = command(hopper_run.folder, "--out", out)
+        assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
+        with pytest.raises(agail.InputError, match="cannot be written"):
+            export(hopper_run.policy, out)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
+
+
+def test_no_space(hopper_run, tmp_path):
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1024, resource.RLIM_INFINITY))
+
+    done = command(hopper_run.folder, "--out", tmp_path / "x.onnx", preexec_fn=limit)
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_actions_are_the_environments(tmp_path):
+    policy = train(Discretes, method="trpo").policy
+    export(policy, tmp_path / "p.onnx")
+    session = onnxruntime.InferenceSession(tmp_path / "p.onnx")
+    (action,) = session.run(["action"], {"observation": np.eye(3, dtype=np.float32)})
+    assert action.dtype == np.int64
+    np.testing.assert_array_equal(action, policy.predict([5, 6, 7])[0])
 
 
 def test_safetensors_package_reads_policies(hopper_run):

@@ -1,5 +1,7 @@
 """Gymnasium's environments in agail, and agail's in Gymnasium."""
 
+import pickle
+import re
 import subprocess
 import sys
 import time
@@ -191,7 +193,26 @@ def test_discrete_spaces():
     run = agail.train(Discretes, method="trpo", timesteps=20_000, progress=False)
     assert run.policy.n_actions == 3 and run.policy.observation_dim == 3
     assert np.nanmax(run.metrics["eval/mean_reward"]) == 20
-    np.testing.assert_array_equal(run.policy.predict(np.eye(3))[0], [0, 1, 2])
+    policy = run.policy
+    # As the environment counts: one observation, a batch, one-hot rows.
+    assert [policy.predict(seen)[0] for seen in (5, 6, np.int64(7))] == [2, 3, 4]
+    action, _ = policy.predict(5)
+    assert action.shape == () and action.dtype == np.int64
+    for batch in ([5, 6, 7], np.eye(3)):
+        np.testing.assert_array_equal(policy.predict(batch)[0], [2, 3, 4])
+    assert agail.record(policy, 2, environment=Discretes)[0].actions.max() == 2  # from 0
+    for wrong in (8, 5.5, np.zeros((2, 2))):
+        with pytest.raises(agail.InputError, match="this policy takes"):
+            policy.predict(wrong)
+    again = pickle.loads(pickle.dumps(policy))
+    np.testing.assert_array_equal(again.predict([7, 5])[0], [4, 2])
+
+
+def test_discrete_observations_only():
+    policy = train("FrozenLake-v1", method="trpo").policy
+    observation, _ = gymnasium.make("FrozenLake-v1").reset(seed=0)
+    assert policy.predict(observation)[0] in range(4)
+    assert policy.predict([0, 3, 15])[0].shape == (3,)
 
 
 class Shaped(Line):
@@ -216,9 +237,41 @@ class Shaped(Line):
 
 
 def test_shaped_spaces_and_bounds():
-    run = train(Shaped, method="trpo")
-    action, _ = run.policy.predict(np.zeros(6))
-    assert action.shape == (4,) and run.policy.observation_dim == 6
+    policy = train(Shaped, method="trpo").policy
+    assert policy.observation_dim == 6 and policy.action_dim == 4
+    observation, _ = Shaped().reset(seed=0)
+    action, _ = policy.predict(observation)
+    assert action.shape == (2, 2) and action.dtype == np.float32
+    for shape, batch in (((6,), ()), ((5, 6), (5,)), ((5, 2, 3), (5,)), ((0, 2, 3), (0,))):
+        assert policy.predict(np.zeros(shape))[0].shape == (*batch, 2, 2)
+    np.testing.assert_array_equal(policy.predict(observation.reshape(6))[0], action)
+    np.testing.assert_array_equal(policy.predict(observation[None])[0][0], action)
+    with pytest.raises(agail.InputError, match=r"\(2, 3\) or \(n, 2, 3\)"):
+        policy.predict(np.zeros((3, 2)))
+    demos = agail.record(policy, 1, environment=Shaped)
+    assert demos.observation_dim == 6 and demos.action_dim == 4
+
+
+class Scalar(Line):
+    """One number seen, one done, each without a dimension."""
+
+    def __init__(self):
+        super().__init__()
+        self.observation_space, self.action_space = spaces.Box(-10, 10, ()), spaces.Box(-1, 1, ())
+
+    def observation(self):
+        return np.array(self.at, np.float32)
+
+    def step(self, action):
+        assert self.action_space.contains(np.asarray(action))
+        self.at += 0.3 * float(action)
+        self.steps += 1
+        return self.observation(), 0.0, False, self.steps == 20, {}
+
+
+def test_spaces_without_dimensions():
+    policy = train(Scalar, method="trpo").policy
+    assert policy.predict(0.5)[0].shape == () and policy.predict([0.5, 1])[0].shape == (2,)
 
 
 @pytest.mark.parametrize(
@@ -257,6 +310,8 @@ def broken(how, after=300):
                     observation[1] = np.nan
                 if how == "shape":
                     observation = np.zeros(3, np.float32)
+                if how == "large":
+                    observation = np.array([1e300, 1])
                 if how == "reward":
                     reward = np.inf
                 if how == "text":
@@ -274,6 +329,7 @@ def broken(how, after=300):
         ("raises", "step.. raised ZeroDivisionError after .* the user's own"),
         ("nan", "nan at index 1"),
         ("shape", r"shape \(3,\), but its observation_space has \(2,\)"),
+        ("large", r"with 1e\+300 at index 0 .* too large for float32"),
         ("reward", "reward inf"),
         ("text", "observation of step"),
         ("four", "4 values in place of .observation, reward, terminated"),
@@ -294,6 +350,58 @@ def test_environments_with_bugs(tmp_path, how, told):
     resumed = train(kind, resume=True, **options)
     assert resumed.finished
     assert resumed.metrics["time/total_timesteps"].tolist() == list(range(256, 4097, 256))
+
+
+def test_a_broken_environment_is_not_asked_again():
+    run = train(Line, method="trpo")
+    kind = broken("raises", after=0)
+    kind.__name__ = "Line"
+    with pytest.raises(agail.InputError, match="ZeroDivisionError"):
+        agail.evaluate(run, 1000, environment=kind)
+    assert kind.total == 1
+
+
+class Unclosable(Line):
+    closed = 0
+
+    def close(self):
+        type(self).closed += 1
+        raise RuntimeError("the viewer is gone")
+
+
+def test_close_that_fails_is_a_warning():
+    with pytest.warns(RuntimeWarning, match=r"Unclosable: close\(\) raised .*viewer is gone"):
+        run = train(Unclosable, method="trpo", lanes=2)
+    assert run.finished and Unclosable.closed == 3  # two lanes and one to evaluate in
+
+    class Worse(Unclosable):
+        def step(self, action):
+            raise ZeroDivisionError("the cause")
+
+    with (
+        pytest.warns(RuntimeWarning, match="viewer is gone"),
+        pytest.raises(agail.InputError, match="the cause"),
+    ):
+        train(Worse, method="trpo")
+
+
+def test_batches_fit_the_lanes_of_a_vector():
+    vector = gymnasium.vector.SyncVectorEnv([Line] * 3)
+    options = {"method": "trpo", "timesteps": 1, "progress": False}
+    assert agail.train(vector, **options).settings["run"]["batch_steps"] == 1023
+    with pytest.raises(agail.InputError, match=r"run\.batch_steps = 256 .*choose a multiple"):
+        train(vector, method="trpo")
+
+
+def test_an_environment_that_is_not_the_policys():
+    run = train(Discretes, method="trpo")
+
+    class Other(Discretes):
+        action_space = spaces.Discrete(4)
+
+    Other.__name__ = "Discretes"
+    with pytest.raises(agail.InputError, match=r"3 discrete actions, .* 4 discrete actions; give"):
+        agail.evaluate(run, 1, environment=Other)
 
 
 def test_bug_at_the_first_reset(tmp_path):
@@ -356,6 +464,22 @@ def test_command_line_with_a_bug_in_the_environment(tmp_path):
     assert done.stderr.splitlines()[-1].startswith("agail: environment mine:Bad-v0")
 
 
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("Pendulum-v9", "versioned environments: .* `v1`"),
+        ("ALE/Pong-v5", "ALE not found"),
+        ("Hoper-v5", "did you mean 'Hopper-v5'"),
+        ("broken_module:Own-v0", "importing broken_module raised ValueError: bad"),
+    ],
+)
+def test_ids_that_nobody_has(tmp_path, name, told):
+    (tmp_path / "broken_module.py").write_text("raise ValueError('bad')\n")
+    done = command("train", name, "--method", "trpo", "--out", "run", cwd=tmp_path)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert re.search(told, done.stderr) and "'Ant" not in done.stderr
+
+
 # --- agail's environments in Gymnasium ----------------------------------------------------------
 
 
@@ -412,6 +536,9 @@ def test_vector_is_its_environments(name):
     same = [ours.reset(seed=9)[0] for _ in range(2)]
     np.testing.assert_array_equal(*same)
     assert len(np.unique(same[0], axis=0)) == count
+    # None: that environment goes on with the numbers that it has.
+    for seeds in ([5, 6, 7], [None] * count, [None, 9, None], [None] * count):
+        np.testing.assert_array_equal(ours.reset(seed=seeds)[0], theirs.reset(seed=seeds)[0])
 
 
 def test_vector_is_asked_for_what_it_has_not():
@@ -420,8 +547,15 @@ def test_vector_is_asked_for_what_it_has_not():
         many.reset(seed=[1, 2])
     with pytest.raises(agail.InputError, match="1 entries of reset_mask for 4"):
         many.reset(options={"reset_mask": np.array([True])})
+    options = {"vectorization_mode": "vector_entry_point"}
     with pytest.raises(agail.InputError, match="num_envs is 0"):
-        _core.NativeEnvironments("CartPole-v1", 0, 1)
+        gymnasium.make_vec("agail/CartPole-v1", 0, **options)
+    for threads in (0, -1):
+        with pytest.raises(agail.InputError, match=f"threads = {threads} should be"):
+            gymnasium.make_vec("agail/CartPole-v1", 2, **options, threads=threads)
+    many.reset(seed=0)
+    with pytest.raises(agail.InputError, match=r"no action 0\.5"):
+        many.step(np.array([0, 0.5, 1, 0]))
 
 
 def test_vector_is_fast():

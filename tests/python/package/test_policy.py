@@ -48,7 +48,9 @@ def test_what_it_takes(hopper):
     constant = double.copy()
     constant.flags.writeable = False
     strided = np.stack([double, double], 1)[:, 0]
-    kinds = (row.tolist(), double, row[None], np.stack([row, row], 1)[:, 0], strided, constant,
+    packed = np.zeros(1, [("byte", "u1"), ("observation", "f8", (11,))])  # at an odd address
+    packed["observation"] = double
+    kinds = (packed["observation"], row.tolist(), double, row[None], np.stack([row, row], 1)[:, 0], strided, constant,
              double.astype(">f8"), array.array("d", double), np.asfortranarray(double[None]))  # fmt: skip
     for same in kinds:
         np.testing.assert_array_equal(hopper.predict(same)[0].reshape(3), expected)
@@ -81,6 +83,10 @@ def test_stochastic(hopper):
     hopper.seed(1)
     np.testing.assert_array_equal(first, draw())
     assert not np.array_equal(first, second) and np.abs(first).max() <= 1
+    hopper.seed(np.int64(2**63 - 1))
+    for wrong in (-1, 2**64, 1.5, None):
+        with pytest.raises(agail.InputError, match=r"seed = .* below 2"):
+            hopper.seed(wrong)
 
 
 def test_pickle(hopper, cartpole):
@@ -106,6 +112,8 @@ def test_save_and_load(hopper, hopper_run, tmp_path):
     best = hopper_run.folder / "policy_best.safetensors"
     assert (tmp_path / "p.safetensors").read_bytes() == best.read_bytes()
     assert agail.Policy.load(tmp_path / "p.safetensors").method == "trpo"
+    hopper.save(tmp_path / "new" / "folder" / "p.safetensors")
+    assert agail.Policy.load(tmp_path / "new" / "folder" / "p.safetensors").method == "trpo"
     with pytest.raises(agail.InputError, match="no such file"):
         agail.Policy.load(tmp_path / "absent")
 
@@ -135,5 +143,7 @@ def test_evaluate(hopper, hopper_run):
     assert ours.mean_return == pytest.approx(result.mean_return, rel=0.5)
     with pytest.raises(agail.InputError, match="CartPole"):
         agail.evaluate(hopper, environment=gymnasium.make("CartPole-v1"))
-    with pytest.raises(agail.InputError, match="episodes"):
-        agail.evaluate(hopper, 0)
+    for episodes in (0, True, 10**7):
+        with pytest.raises(agail.InputError, match="episodes"):
+            agail.evaluate(hopper, episodes)
+    assert result != agail.evaluate(hopper, 5) and result in [result] and len({result}) == 1

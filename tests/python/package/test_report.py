@@ -76,6 +76,16 @@ def test_page(runs, tmp_path):
         assert path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 10_000
 
 
+def test_a_run_that_learns_without_updates(runs, hopper_demos, tmp_path):
+    train("Hopper-v5", hopper_demos, method="bc", out=tmp_path / "bc")
+    done = report(runs / "agail-0.25-0", tmp_path / "bc", "--out", tmp_path / "r.html")
+    assert done.returncode == 0 and "2 runs" in done.stdout, done.stderr
+    text = (tmp_path / "r.html").read_text()
+    assert "Hopper-v5: bc" in text and 'class="broken"' not in text
+    done = report(tmp_path / "bc", "--out", tmp_path / "alone.html")
+    assert done.returncode == 0 and "1 of 1" in (tmp_path / "alone.html").read_text()
+
+
 def test_one_run_and_broken_ones(runs, tmp_path):
     (tmp_path / "empty").mkdir()
     (tmp_path / "broken").mkdir()

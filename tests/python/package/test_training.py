@@ -6,10 +6,11 @@ import sys
 import textwrap
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
-from small import SMALL, train
+from small import SMALL, Line, train
 
 import agail
 
@@ -64,6 +65,11 @@ def test_settings():
         ({"timesteps": 0}, "timesteps"),
         ({"seed": -1}, "seed"),
         ({"threads": 0}, "threads"),
+        ({"threads": "2"}, "threads = '2' should be a whole number"),
+        ({"threads": 2.0}, "threads"),
+        ({"seed": 2**64}, "seed"),
+        ({"timesteps": True}, "timesteps = True"),
+        ({"preset": Path("absent.toml")}, r"absent\.toml"),
         ({"resume": True}, "out"),
         ({"preset": "papr"}, "paper"),
         ({"environment": 3}, "no environment"),
@@ -73,6 +79,12 @@ def test_settings():
 def test_wrong_arguments(arguments, told):
     with pytest.raises(ValueError, match=told):
         train(**{"environment": "CartPole-v1", "method": "trpo", **arguments})
+
+
+def test_preset_may_be_a_path(hopper_run):
+    preset = hopper_run.folder / "config.toml"
+    run = agail.train("Hopper-v5", method="trpo", preset=preset, progress=False)
+    assert run.settings == hopper_run.settings
 
 
 def test_callback_sees_the_log():
@@ -176,6 +188,70 @@ def test_terminated(tmp_path):
     process.communicate(timeout=60)
     assert process.returncode == -signal.SIGTERM
     assert agail.Run(tmp_path / "run").policy.timesteps > 0
+
+
+ENDLESS = """
+    import sys
+    sys.path.insert(0, {tests!r})
+    import agail
+    from small import Line, train
+
+    class Told(Line):
+        def step(self, action):
+            if self.steps == 2:
+                print("step", flush=True)
+            observation, reward, *_, info = super().step(action)
+            self.at = 0.0
+            return observation, reward, False, {truncates}, info
+
+    try:
+        {work}
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("function", ["evaluate", "record"])
+def test_episodes_can_be_interrupted(tmp_path, function, number):
+    """Those of C++ and those of Python, in the midst of an episode."""
+    train("CartPole-v1", method="trpo", out=tmp_path / "built-in", timesteps=256)
+    train(Line, method="trpo", out=tmp_path / "own", timesteps=256)
+    for run, environment in (("built-in", None), ("own", "Told")):
+        work = (
+            f'print("step", flush=True); Told.__name__ = "Line"; '
+            f"agail.{function}({str(tmp_path / run)!r}, 10**6, environment={environment}, threads=1)"
+        )
+        script = ENDLESS.format(tests=str(Path(__file__).parent), truncates=False, work=work)
+        process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)],
+                                   stdout=subprocess.PIPE, text=True)  # fmt: skip
+        assert process.stdout.readline() == "step\n"
+        if environment is None:
+            time.sleep(0.5)  # the episodes have begun
+        else:
+            assert process.stdout.readline() == "step\n"
+        process.send_signal(number)
+        rest, _ = process.communicate(timeout=60)
+        if number == signal.SIGINT:
+            assert rest.splitlines()[-1] == "interrupted" and process.returncode == 0
+        else:
+            assert process.returncode == -signal.SIGTERM
+
+
+def test_second_ctrl_c_ends_an_evaluation_that_never_ends():
+    """The evaluation of an update is whole for the first one; the second one aborts all its episodes."""
+    work = 'train(Told, method="trpo", timesteps=256, run={"evaluate_every": 1})'
+    script = ENDLESS.format(tests=str(Path(__file__).parent), truncates=False, work=work)
+    process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)],
+                               stdout=subprocess.PIPE, text=True)  # fmt: skip
+    for _ in range(2):  # the episode of the batch, and that of the evaluation
+        assert process.stdout.readline() == "step\n"
+    process.send_signal(signal.SIGINT)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(1)
+    process.send_signal(signal.SIGINT)
+    rest, _ = process.communicate(timeout=60)
+    assert rest.splitlines()[-1] == "interrupted" and process.returncode == 0
 
 
 def test_temporary_run_goes_with_the_object():

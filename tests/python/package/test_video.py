@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 from small import train
+from test_gymnasium import Discretes
 
 import agail
 from agail import _core
 from agail._pictures import captioned
 from agail._rendering import Placer
-from agail.video import HOLD
+from agail.video import HOLD, film
 
 AGAIL = str(Path(sys.executable).with_name("agail"))
 
@@ -144,6 +145,18 @@ def test_states_from_observations(name, tmp_path, monkeypatch):
     np.testing.assert_allclose(position[:hidden], way, atol=0.03 + 0.1 * np.abs(way).max())
 
 
+class Shown(Discretes):
+    """Draws itself, and takes nothing but numbers of its action space, which starts at 2."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+
+    def __init__(self, render_mode=None):
+        self.render_mode = render_mode
+
+    def render(self):
+        return np.full((64, 64, 3), 30 * self.seen, np.uint8)
+
+
 OWN = """
 import gymnasium
 class Blind(gymnasium.Env):
@@ -174,7 +187,7 @@ def own(tmp_path):
         (["--out", "x.mp4", "--size", "321x240"], "as 640x480"),
         (["--out", "x.mp4", "--size", "9000x240"], "as 640x480"),
         (["--out", "x.mp4", "--fps", "0"], "from 1 to 120"),
-        (["--out", "x.mp4", "--episodes", "0"], "at least 1"),
+        (["--out", "x.mp4", "--episodes", "0"], "episodes = 0 should be"),
         (["--out", "x.mp4", "--episodes", "x"], "invalid int"),
         (["--out", "x.mp4", "--seed", "-1"], "from 0 to"),
         (["--out", "x.mp4", "--env", "Walker2d-v5"], "does not fit Walker2d-v5"),
@@ -183,7 +196,7 @@ def own(tmp_path):
         (["--out", "x.mp4", "--env", "own:Blind-v0"], "cannot draw itself"),
         (["--out", "x.mp4", "--env", "own:Torn-v0"], "render() raised ValueError: no ink"),
         (["--out", "x.mp4", "--demos", "absent.hdf5"], "absent.hdf5"),
-        (["--out", "x.mp4", "--demos", "demos.hdf5", "--episodes", "7"], "there are 6 in"),
+        (["--out", "x.mp4", "--demos", "demos.hdf5", "--episodes", "7"], "there are 6"),
         (["--out", "x.mp4", "--demos", "cartpole.hdf5"], "give demonstrations of Hopper-v5"),
     ],
 )
@@ -201,6 +214,36 @@ def test_wrong_input(hopper_run, hopper_demos, tmp_path, own, monkeypatch, words
     assert done.returncode == 2 and done.stdout == "", done
     assert len(done.stderr.splitlines()) == 1 and told in done.stderr, done.stderr
     assert sorted(tmp_path.iterdir()) == sorted(before)
+
+
+def test_wrong_arguments(hopper_run, hopper_demos, tmp_path, monkeypatch):
+    """The same from Python, before anything is drawn."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("agail.video.Player", None)
+    wrong = (
+        {"out": "x.avi"},
+        {"episodes": 0},
+        {"episodes": 7, "demonstrations": hopper_demos},
+        {"fps": 0},
+        {"fps": "25"},
+        {"seed": -1},
+        {"size": (321, 240)},
+    )
+    for arguments in wrong:
+        with pytest.raises(agail.InputError):
+            film(hopper_run.policy, **{"out": "x.mp4", **arguments})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_environment_with_its_own_spaces(tmp_path):
+    """It is asked with its own observations and gets actions that are its own."""
+    gymnasium.register("Shown-v0", Shown)
+    policy = train("Shown-v0", method="trpo", timesteps=256).policy
+    expected = agail.record(policy, 1, environment="Shown-v0")  # under other seeds
+    assert len(expected[0]) == 20
+    (total,) = film(policy, tmp_path / "x.gif", size=(64, 64))
+    assert 0 <= total <= 20
+    gymnasium.registry.pop("Shown-v0")
 
 
 def test_no_policy(tmp_path):

@@ -31,6 +31,7 @@ def test_requires_the_mujoco_that_it_was_built_with():
 def test_typed():
     assert (PACKAGE / "py.typed").exists()
     stub = (PACKAGE / "_core.pyi").read_text()
+    assert "class InputError(ValueError)" in stub
     assert (
         "class Policy" in stub and "def predict(self, observation: numpy.typing.ArrayLike" in stub
     )
@@ -122,4 +123,5 @@ def test_source_distribution(tmp_path):
             if path.is_file() and "__pycache__" not in path.parts:
                 assert str(path.relative_to(ROOT)) in names
     assert {"CMakeLists.txt", "pyproject.toml", "LICENSE", "README.md"} <= names
-    assert not any(name.startswith((".venv", "build", "results")) for name in names)
+    assert not any(name.startswith((".venv", "build")) for name in names)
+    assert {name for name in names if name.startswith("results/")} == {"results/paper/table1.csv"}

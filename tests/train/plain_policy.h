@@ -1,0 +1,22 @@
+// A policy that nobody trained: all its parameters are 0.
+#pragma once
+
+#include <utility>
+
+#include "agail/train/saved_policy.h"
+
+namespace agail {
+
+inline SavedPolicy plain_policy(PolicyInfo info, int observation_dim, const ActionSpace& action) {
+  const Sizes hidden = {4};
+  const PolicyNetwork<float> network(observation_dim, hidden, action);
+  return {std::move(info),
+          observation_dim,
+          action,
+          hidden,
+          Normalizer(observation_dim, false, 5),
+          Vector<double>::Ones(observation_dim),
+          Vector<float>::Zero(network.parameters())};
+}
+
+}  // namespace agail
