@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -80,11 +81,8 @@ int run_and_flush(int argc, char** argv, agail::Communicator& communicator) {
       std::cout.flush();
       if (!std::cout) throw agail::SystemError("cannot write to standard output");
     });
-  } catch (const agail::InputError& e) {
-    if (communicator.ranks() == 1) throw agail::JobFailure{2, e.what()};
-    agail::together(communicator, [] { throw; });
-  } catch (const std::exception& e) {
-    if (communicator.ranks() == 1) throw agail::JobFailure{1, e.what()};
+  } catch (const std::exception&) {
+    if (communicator.ranks() == 1) throw agail::current_failure();
     agail::together(communicator, [] { throw; });
   }
   return code;
@@ -93,6 +91,7 @@ int run_and_flush(int argc, char** argv, agail::Communicator& communicator) {
 }  // namespace
 
 int agail::command_line(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond `ulimit -f` fails, as on a full disk
   std::unique_ptr<agail::Communicator> communicator;
   try {
     // The processes of `reproduce` share work through files; a launcher may start them, too.
@@ -102,7 +101,8 @@ int agail::command_line(int argc, char** argv) {
     else
       communicator = agail::join_ranks();
   } catch (const agail::InputError& e) {
-    if (agail::is_first_rank()) std::fprintf(stderr, "agail: %s\n", e.what());
+    if (agail::is_first_rank())
+      std::fprintf(stderr, "agail: %s\n", agail::one_line(e.what()).c_str());
     return 2;
   }
   try {

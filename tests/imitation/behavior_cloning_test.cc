@@ -56,6 +56,29 @@ TEST(BehaviorCloning, FitsALinearPolicy) {
   EXPECT_GE(network.log_std(theta.data())[0], -3);
 }
 
+TEST(BehaviorCloning, TellsDivergenceAndWhatWasNotMeasured) {
+  const DemoData demos(linear_policy());
+  ThreadPool pool(1);
+  const PolicyNetwork<float> network(3, {8}, continuous_actions(2));
+  const Normalizer normalizer(3, false, 5);
+  const auto clone = [&](double learning_rate, double validation_share) {
+    Vector<float> theta = Vector<float>::Constant(network.parameters(), 0.1F);
+    BcSettings settings;
+    settings.epochs = 2;
+    settings.learning_rate = learning_rate;
+    settings.validation_share = validation_share;
+    return clone_policy(network, normalizer, demos,
+                        {demos.actions, demos.available, demos.some_action}, settings, true, pool,
+                        1, theta);
+  };
+  EXPECT_THROW(clone(1e38, 0.1), InputError);
+  EXPECT_THROW(clone(1e38, 0), InputError);
+  const RegressionReport report = clone(1e-3, 0);
+  EXPECT_EQ(report.best_epoch, 2);
+  EXPECT_TRUE(std::isnan(report.quality));
+  EXPECT_TRUE(std::isnan(report.validation_loss));
+}
+
 TEST(BehaviorCloning, SameBitsForAnyNumberOfThreads) {
   const DemoData demos(linear_policy());
   Vector<float> first;

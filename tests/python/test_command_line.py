@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 
 import h5py
 import pytest
@@ -79,6 +80,15 @@ TRAIN = ["train", "CartPole-v1", "--method", "trpo", "--out", "run"]
         (["record", "x" * 300, "--episodes", "1", "--out", "x.hdf5"], "File name too long"),
         (["record", "absent", "--episodes", "1", "--out", ""], "--out"),
         (["inspect", "x" * 300], "File name too long"),
+        (["mask", "x" * 50_000, "--missing", "0.5", "--out", "x.hdf5"], "File name too long"),
+        (["mask", "absent.hdf5", "--missing", "0.5", "--out", "x" * 300], "File name too long"),
+        (["mask", "absent.hdf5", "--missing", "", "--out", "x.hdf5"], "--missing"),
+        (["bench", "CartPole-v1", "--missing", ""], "--missing"),
+        (["inspect", "a\nb\x1b[31m.hdf5"], "a b [31m.hdf5"),
+        ([*TRAIN, "--set", "a\nb=3"], "a b"),
+        ([*TRAIN, "--set", "policy.hidden=[4294967297]"], "at most 1048576"),
+        ([*TRAIN, "--set", "trpo.fisher_stride=4294967296"], "at most 1048576"),
+        ([*TRAIN, "--set", "value.hidden=[1048576, 1048576]"], "not enough memory"),
     ],
     ids=lambda value: " ".join(value)[:60] if isinstance(value, list) else "",
 )
@@ -124,6 +134,15 @@ def test_out_that_is_taken(agail, small, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+def test_a_file_size_limit_is_a_full_disk(agail, small, tmp_path):
+    done = agail.run(
+        "mask", small / "cartpole.hdf5", "--missing", 0.5, "--out", tmp_path / "x.hdf5",
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)),
+    )  # fmt: skip
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_out_that_cannot_be_created(agail, small, tmp_path):
     (tmp_path / "file").write_text("")
     for out in (tmp_path / "file" / "run", "/proc/run"):
@@ -131,6 +150,34 @@ def test_out_that_cannot_be_created(agail, small, tmp_path):
     for out in (tmp_path / "file" / "x.hdf5", tmp_path / "file" / "folder"):
         agail.refused("mask", small / "cartpole.hdf5", "--missing", 0.5, "--out", out)
         agail.refused("record", small / "cartpole-expert", "--episodes", 1, "--out", out)
+
+
+def test_out_is_checked_first(agail, tmp_path):
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "thesis.tex").write_text("x")
+    for command in (
+        ["record", "absent", "--episodes", 1],
+        ["mask", "absent.hdf5", "--missing", 0.5],
+        ["convert", "absent.npz", "--env", "Hopper-v5"],
+    ):
+        assert "no Minari dataset" in agail.refused(*command, "--out", mine)
+        assert "is a file" in agail.refused(*command, "--out", f"{mine}/thesis.tex/")
+        assert "absent" in agail.refused(*command, "--out", tmp_path / "new" / "x.hdf5")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+    assert (mine / "thesis.tex").read_text() == "x"
+
+
+def test_damaged_summary(agail, tmp_path):
+    (tmp_path / "config.toml").touch()
+    assert "no summary.json" in agail.json("inspect", tmp_path)["note"]
+    summary = tmp_path / "summary.json"
+    for content in ("", "[]", "5", '"x"', "null", '{"seed": 1', "[" * 200_000, '{"a":' * 200_000):
+        summary.write_text(content)
+        assert "summary.json is damaged" in agail.refused("inspect", tmp_path)
+    summary.unlink()
+    summary.mkdir()
+    assert "it is a folder" in agail.refused("inspect", tmp_path)
 
 
 def damaged(whole):
@@ -239,6 +286,23 @@ def test_bench(agail):
     assert result["ratio"] == pytest.approx(result["training_us"] / result["stepping_us"])
     again = agail.json("bench", "CartPole-v1", "--updates", 2, "--missing", 0.5)
     assert again[0]["signature"] == result["signature"]
+
+
+def test_what_convert_ignores_is_a_note(agail, tmp_path):
+    arrays, out = tmp_path / "arrays.csv", tmp_path / "demos.hdf5"
+    names = ["no\x1bte", *(f"extra_{i}" for i in range(11))]
+    table = [["obs_0", *names], [0, *names], [1, *names]]
+
+    def convert():
+        arrays.write_text("".join(",".join(map(str, row)) + "\n" for row in table))
+        return agail.run("convert", arrays, "--env", "Some-v0", "--out", out)
+
+    shown = ", ".join(["no te", *names[1:10]])
+    assert convert().stderr == f"agail: note: ignored in {arrays}: {shown} and 2 more\n"
+    assert out.exists()
+    table[2][0] = "nan"
+    done = convert()
+    assert done.returncode == 2 and "ignored" not in done.stderr, "first whether it works"
 
 
 def test_results_on_stdout_progress_on_stderr(agail, tmp_path):

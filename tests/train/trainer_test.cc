@@ -159,6 +159,57 @@ TEST(CheckSettings, LanesAndFeaturesMustFit) {
   EXPECT_THROW(Trainer{std::move(lanes)}, InputError);
 }
 
+TEST(Bco, ARunShorterThanARoundEndsWithOne) {
+  for (const int batches : {1, 4}) {
+    TrainingTask t = task("CartPole-v1", "bco");
+    t.settings.bco.every = 3;
+    t.settings.run.timesteps = batches * t.settings.run.batch_steps;
+    t.demonstrations = masked("CartPole-v1", 1);
+    Trainer trainer(std::move(t));
+    for (int i = 0; i < batches; ++i)  // of four the last one is left over
+      EXPECT_EQ(trainer.update().bco.has_value(), batches == 1 || i == 2) << i;
+    EXPECT_TRUE(trainer.finished());
+  }
+}
+
+TEST(Divergence, EndsTheRun) {
+  for (const std::string method : {"trpo", "state-gail"}) {
+    TrainingTask t = task("Hopper-v5", method);
+    if (method == "trpo") {
+      t.settings.value.learning_rate = 1e30;
+    } else {
+      t.demonstrations = masked("Hopper-v5", 0.5);
+      t.settings.discriminator.learning_rate = 1e39;
+    }
+    Trainer trainer(std::move(t));
+    std::string message;
+    try {
+      for (int i = 0; i < 5; ++i) trainer.update();
+    } catch (const InputError& error) {
+      message = error.what();
+    }
+    EXPECT_NE(message.find("training diverged after"), std::string::npos) << method << message;
+  }
+}
+
+TEST(ExploringStart, DiscriminatorLearnsFromTheFirstBatchItSees) {
+  TrainingTask t = task("Hopper-v5", "agail");
+  t.settings.start.method = "clone-inferred";
+  t.settings.discriminator.every = 50;
+  t.demonstrations = random_demonstrations("Hopper-v5", 15, 3);
+  remove_actions(*t.demonstrations,
+                 {.pattern = MaskPattern::kDimension, .ratio = 0.34, .seed = 4, .dimension = 1});
+  Trainer trainer(std::move(t));
+  for (int i = 0; i < 16; ++i) {
+    const UpdateReport report = trainer.update();
+    EXPECT_EQ(report.imitation.has_value(), i >= 12);
+    if (report.imitation) {
+      EXPECT_EQ(report.imitation->discriminator.has_value(), i == 12) << i;
+      EXPECT_EQ(report.imitation->guide.has_value(), i == 12) << i;
+    }
+  }
+}
+
 TEST(ExploringStart, OwnTransitionsTellADimensionThatNoDemonstrationTells) {
   TrainingTask t = task("Hopper-v5", "agail");
   t.settings.start.method = "clone-inferred";

@@ -80,9 +80,7 @@ Traffic total_of(Communicator& communicator, const Traffic& own) {
     Traffic one;
     AGAIL_CHECK(all[r].size() == sizeof one);
     std::memcpy(&one, all[r].data(), sizeof one);
-    total.messages += one.messages;
-    total.bytes += one.bytes;
-    total.seconds += one.seconds;
+    total += one;
   }
   return total;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <new>
 
 #include "agail/base/error.h"
 #include "agail/comm/collectives.h"
@@ -14,14 +15,26 @@ JobFailure outcome_of(const std::function<void()>& step) {
   try {
     step();
     return {0, ""};
-  } catch (const InputError& error) {
-    return {2, error.what()};
-  } catch (const std::exception& error) {
-    return {1, error.what()};
+  } catch (const std::exception&) {
+    return current_failure();
   }
 }
 
 }  // namespace
+
+JobFailure current_failure() {
+  try {
+    throw;
+  } catch (const InputError& error) {
+    return {2, one_line(error.what())};
+  } catch (const std::bad_alloc&) {
+    return {2,
+            "there is not enough memory; lower run.batch_steps, hidden layers or minibatches, use "
+            "fewer demonstrations, or a machine or container with more"};
+  } catch (const std::exception& error) {
+    return {1, one_line(error.what())};
+  }
+}
 
 void together(Communicator& communicator, const std::function<void()>& step) {
   if (communicator.ranks() == 1) return step();

@@ -14,8 +14,12 @@ struct JobFailure {
   std::string message;
 };
 
+// What the exception that is being handled means: exit code 2 for an InputError or too little
+// memory, else 1; a message of one line.
+JobFailure current_failure();
+
 // Runs `step`, which must not exchange anything, on every rank; if it fails on any, all ranks throw
-// JobFailure: 2 for an InputError, else 1; with the rank's name if only some ranks fail. The only
+// JobFailure as current_failure() has it, with the rank's name if only some ranks fail. The only
 // rank's exceptions pass as they are.
 void together(Communicator& communicator, const std::function<void()>& step);
 

@@ -133,7 +133,7 @@ RegressionReport fit_actions(const PolicyNetwork<float>& network, Vector<float>&
   Adam<float> adam(network.mlp.parameters());
   Vector<float> best = theta;
   RegressionReport report;
-  report.validation_loss = std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
 
   // An interrupt ends a fit before training, of which nothing is kept. A later round is part of an
   // update, after which a checkpoint is saved: it is finished first.
@@ -143,26 +143,28 @@ RegressionReport fit_actions(const PolicyNetwork<float>& network, Vector<float>&
     shuffle(training, order);
     const double rate = settings.learning_rate *
                         (1 - static_cast<double>(epoch - 1) / static_cast<double>(settings.epochs));
-    double loss = 0;
     for (Index start = 0; start < training_size; start += settings.minibatch) {
       const Index count = std::min<Index>(settings.minibatch, training_size - start);
-      loss += minibatches.loss(theta, x, actions, available, training.data() + start, count) *
-              static_cast<double>(count) / static_cast<double>(training_size);
+      minibatches.loss(theta, x, actions, available, training.data() + start, count);
       adam.descend(pool, theta.head(network.mlp.parameters()), minibatches.gradient(), rate);
     }
     report.epochs = epoch;
     if (held > 0) {
       const double validation_loss =
           whole.loss(theta, x, actions, available, validation.data(), held);
-      if (validation_loss >= report.validation_loss) continue;
+      if (!(validation_loss < least)) continue;  // NaN is no improvement
+      least = validation_loss;
       report.validation_loss = validation_loss;
       report.quality = whole.quality(held);
       best = theta;
     }
     report.best_epoch = epoch;
-    report.training_loss = loss;
   }
   if (held > 0) theta = best;
+  if ((report.epochs > 0 && report.best_epoch == 0) || !theta.allFinite())
+    throw InputError(purpose == Purpose::kClone
+                         ? "behaviour cloning diverged; lower bc.learning_rate"
+                         : "inverse dynamics diverged; lower inverse_dynamics.learning_rate");
   return report;
 }
 

@@ -2,6 +2,8 @@
 // cloning regresses on the state, inverse dynamics on two successive states.
 #pragma once
 
+#include <limits>
+
 #include "agail/base/thread_pool.h"
 #include "agail/config/settings.h"
 #include "agail/rl/policy_network.h"
@@ -11,10 +13,11 @@ namespace agail {
 struct RegressionReport {
   std::int64_t epochs = 0;      // trained
   std::int64_t best_epoch = 0;  // whose parameters were kept
-  double training_loss = 0;
-  double validation_loss =
-      0;               // continuous: mean of sum_i (a_i - mean_i)^2 / 2; discrete: -log p(a)
-  double quality = 0;  // continuous: explained variance of held-out entries; discrete: share right
+  // On held-out steps, of the epoch that was kept; NaN if none are held out.
+  // Continuous: mean of sum_i (a_i - mean_i)^2 / 2; discrete: -log p(a).
+  double validation_loss = std::numeric_limits<double>::quiet_NaN();
+  // Continuous: explained variance of the entries; discrete: share right.
+  double quality = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct RegressionSettings {
@@ -28,6 +31,7 @@ struct RegressionSettings {
 // Fits theta's network part in place with Adam whose rate falls linearly to zero; keeps the
 // parameters of the epoch with the least validation loss. x: inputs + row of ones; actions,
 // available: action_dim x n. `columns`: the samples that may be used. log_std stays as it is.
+// InputError if the loss of every epoch is NaN or infinite: the learning rate is too large.
 RegressionReport fit_actions(const PolicyNetwork<float>& network, Vector<float>& theta,
                              const Matrix<float>& x, const Matrix<float>& actions,
                              const Matrix<float>& available, std::vector<Index> columns,

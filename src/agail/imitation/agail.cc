@@ -53,7 +53,8 @@ ImitationReport AdversarialReward::update(const Batch& batch, const PolicyView& 
     clip_action(action_, batch.actions.col(j).data(), executed_.col(j).data());
   const Discriminator::Samples visited{batch.observations, executed_, n};
   const Discriminator::Samples demonstrated{demos_.states, demos_.actions, demos_.size()};
-  const bool learns = update % settings_.discriminator.every == 0;
+  // The first batch it sees has another number than 0 after a start that explores.
+  const bool learns = update % settings_.discriminator.every == 0 || !discriminator_.has_learned();
 
   stopwatch.start(Phase::kDiscriminator);
   // Sample states s_i ~ tau and s_E ~ demonstrations; update D by the gradient of log D(s_i) +

@@ -12,8 +12,8 @@
 
 namespace agail {
 
-// What the last update learned and paid; NaN where a part does not exist or did not learn on this
-// batch.
+// What the last update learned and paid; the reports are absent where a part does not exist or did
+// not learn on this batch.
 struct ImitationReport {
   std::optional<DiscriminatorReport> discriminator;
   std::optional<GuideReport> guide;

@@ -47,8 +47,8 @@ DiscriminatorLoss<S>::DiscriminatorLoss(const Mlp<S>& mlp, const DiscriminatorSe
     : mlp_(mlp),
       settings_(settings),
       pool_(pool),
-      sums_(mlp.parameters(), 3 * (chunk_count(settings.minibatch) + 1) * kChunk),
-      chunk_reports_(Matrix<double>::Zero(4, 3 * (chunk_count(settings.minibatch) + 1))) {
+      sums_(mlp.parameters(), 3 * chunk_count(settings.minibatch) * kChunk),
+      chunk_reports_(Matrix<double>::Zero(4, 3 * chunk_count(settings.minibatch))) {
   for (int i = 0; i < pool.threads(); ++i)
     workers_.push_back({mlp.make_scratch(), Matrix<S>::Zero(1, kChunk)});
 }

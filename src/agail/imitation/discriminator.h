@@ -78,6 +78,7 @@ class Discriminator {
   // rewards[j] of the policy's samples: softplus(d) = -log(1 - P) | d | P | log P.
   void rewards(const Samples& policy, Vector<float>& rewards);
 
+  bool has_learned() const { return adam_.steps() > 0; }
   void archive(Archive& a);
 
  private:

@@ -40,9 +40,9 @@ RegressionReport InverseDynamics::learn(const Transitions& data, std::vector<Ind
   const Index n = data.states.cols();
   normalizer_ = Normalizer(static_cast<int>(dim_), true, clip_);
   normalizer_.update(pool, data.states);
-  const Matrix<float> differences = data.next_states - data.states;
   for (Index i = 0; i < dim_; ++i) {
-    const double square = differences.row(i).cast<double>().squaredNorm() / static_cast<double>(n);
+    const auto difference = data.next_states.row(i) - data.states.row(i);
+    const double square = difference.cast<double>().squaredNorm() / static_cast<double>(n);
     scale_[i] = square > 0 ? 1 / std::sqrt(square) : 0;
   }
   const RegressionSettings regression{

@@ -50,6 +50,8 @@ class Adam {
     theta.array() -= step.rate * m / (v.sqrt() + step.epsilon);
   }
 
+  std::int64_t steps() const { return step_; }
+
   void archive(Archive& a) requires std::same_as<S, float> {
     a("first_moment", all_of(first_));
     a("second_moment", all_of(second_));

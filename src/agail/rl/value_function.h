@@ -23,6 +23,7 @@ class ValueFunction {
   // `update` numbers the fits, so that each shuffles in its own order.
   void fit(const Matrix<float>& x, const Vector<float>& targets, Index n, std::uint32_t update);
 
+  bool finite() const { return theta_.allFinite(); }
   void archive(Archive& a);
 
  private:

@@ -92,6 +92,8 @@ void CsvLog::put(const std::string& text) {
   if (!file_) throw SystemError("cannot write " + path_.string() + "; is the disk full?");
 }
 
+void CsvLog::sync() { sync_file(path_); }
+
 void CsvLog::truncate_after(std::string_view column, double value) {
   const auto found = std::find(columns_.begin(), columns_.end(), column);
   AGAIL_CHECK(found != columns_.end());

@@ -24,6 +24,9 @@ class CsvLog {
   // Several at once: values of the first row, then of the second...
   void rows(std::span<const double> values);
 
+  // Everything so far is on the disk, and outlasts a power cut, when this returns.
+  void sync();
+
   // Drops the rows whose `column` is larger than `value`, and a last row that was cut short: after
   // a crash the file may be ahead of the checkpoint that the run goes on from.
   void truncate_after(std::string_view column, double value);

@@ -1,6 +1,7 @@
 #include "agail/train/run.h"
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -106,11 +107,15 @@ void write_summary(const fs::path& folder, const Trainer& trainer, const RunOutc
 void tell_start(const Trainer& trainer) {
   const char* measure =
       environment_spec(trainer.task().environment).action.discrete ? "right" : "R^2";
-  if (trainer.inverse_dynamics())
-    std::fprintf(stderr, "missing actions inferred (inverse dynamics, held-out %s %.3f)\n", measure,
-                 trainer.inverse_dynamics()->quality);
-  if (trainer.cloning())
-    std::fprintf(stderr, "policy cloned (held-out %s %.3f)\n", measure, trainer.cloning()->quality);
+  const auto tell = [&](const char* what, const std::optional<RegressionReport>& report) {
+    if (!report) return;
+    if (std::isnan(report->quality))
+      std::fprintf(stderr, "%s (nothing held out)\n", what);
+    else
+      std::fprintf(stderr, "%s (held-out %s %.3f)\n", what, measure, report->quality);
+  };
+  tell("missing actions inferred by inverse dynamics", trainer.inverse_dynamics());
+  tell("policy cloned", trainer.cloning());
 }
 
 // Prepares, then trains. What only rank 0 does (files, the log) does not change the state.

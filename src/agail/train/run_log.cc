@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -168,17 +169,17 @@ void RunLog::show(const UpdateReport& report, double steps_per_second) {
   if (!visible_) return;
   const double share =
       std::min(1.0, static_cast<double>(report.timesteps) / static_cast<double>(total_timesteps_));
-  const double left =
-      static_cast<double>(total_timesteps_ - report.timesteps) / std::max(steps_per_second, 1e-9);
+  const auto left = static_cast<std::int64_t>(std::clamp(
+      static_cast<double>(total_timesteps_ - report.timesteps) / steps_per_second, 0.0, 1e15));
   char evaluated[48] = "";
   if (evaluated_return_)
     std::snprintf(evaluated, sizeof evaluated, "  evaluated %.1f", *evaluated_return_);
   char line[200];
-  std::snprintf(line, sizeof line, "%9lld/%lld steps  %6.0f steps/s  return %.1f%s  left %d:%02d",
+  std::snprintf(line, sizeof line,
+                "%9lld/%lld steps  %6.0f steps/s  return %.1f%s  left %lld:%02lld",
                 static_cast<long long>(report.timesteps), static_cast<long long>(total_timesteps_),
                 steps_per_second, report.episode_return, evaluated,
-                static_cast<int>(std::max(left, 0.0)) / 60,
-                static_cast<int>(std::max(left, 0.0)) % 60);
+                static_cast<long long>(left / 60), static_cast<long long>(left % 60));
   if (terminal_) {
     constexpr int kWidth = 24;
     const int full = static_cast<int>(share * kWidth);

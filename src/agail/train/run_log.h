@@ -35,8 +35,13 @@ class RunLog {
   std::vector<double> update(const UpdateReport& report, std::span<const FinishedEpisode> finished,
                              const Stopwatch& stopwatch,
                              const std::optional<Evaluation>& evaluation);
-  // Hands everything to the operating system.
-  void flush() { events_.flush(); }
+  // Before a checkpoint: its rows are on the disk; TensorBoard's events are with the operating
+  // system.
+  void flush() {
+    events_.flush();
+    csv_.sync();
+    episodes_.sync();
+  }
   // Ends the bar, if there is one.
   void finish();
 
