@@ -35,7 +35,15 @@ def run(work: Callable[[], None]) -> None:
 def unwritten(path: str | os.PathLike[str], error: OSError, advice: str) -> Exception:
     """What to raise: InputError where the path is wrong, RuntimeError where the machine failed."""
     told = f"{os.fspath(path)}: cannot be written ({error.strerror})"
-    if error.errno in (errno.ENOENT, errno.EISDIR, errno.EACCES, errno.ENOTDIR):
+    users = (
+        errno.ENOENT,
+        errno.EISDIR,
+        errno.EACCES,
+        errno.ENOTDIR,
+        errno.ENAMETOOLONG,
+        errno.EROFS,
+    )
+    if error.errno in users:
         return InputError(f"{told}; {advice}")
     return RuntimeError(told)
 

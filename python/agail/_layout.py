@@ -73,9 +73,9 @@ class PolicyLayout:
 
     def rows(self, observation: ArrayLike) -> tuple[NDArray[np.float64], bool]:
         """(n, observation_dim), and whether it was one observation rather than a batch. InputError."""
-        array = np.asarray(observation, np.float64)
         shape, size = self._observations.shape, self._observations.size
         try:
+            array = np.asarray(observation, np.float64)
             if array.shape == shape:
                 return self._observations.rows(array[None]), True
             if array.shape[1:] == shape:
@@ -93,4 +93,7 @@ class PolicyLayout:
     def own_actions(self, rows: NDArray[Any], single: bool) -> NDArray[Any]:
         """As the environment takes them, from those of as many rows; a single one without the batch."""
         own = self._actions.own(rows)
-        return own.reshape(own.shape[1:]) if single else own
+        if not single:
+            return own
+        # Of a Discrete space a number rather than an array, as some environments look it up.
+        return own[0] if self._actions.start is not None else own.reshape(own.shape[1:])

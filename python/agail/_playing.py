@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from agail._core import InputError, Policy
 from agail._pictures import beside, captioned
-from agail._recording import Seen, act
 from agail._rendering import Placer, draw, make_drawn
 from agail._source import Source
 from agail.demonstrations import Episode
@@ -55,7 +54,7 @@ class Player:
         """InputError if they do not fit."""
         self.environment = make_drawn(name, size)
         self._policy = policy
-        self._source = source = Source(self.environment)
+        source = Source(self.environment)
         sizes = source.observations.size, source.actions.size, source.spec(source.name).get("n", 0)
         if sizes != (policy.observation_dim, policy.action_dim, policy.n_actions):
             raise InputError(
@@ -63,20 +62,20 @@ class Player:
                 f"{policy.observation_dim} numbers, not {sizes[0]}, or has other actions; give "
                 "another --env"
             )
-        self._lane = source.lane(Seen)
+        self._lane = source.make(source.name)
 
     def moments(self, seed: int, start: NDArray[np.float64] | None) -> Iterator[Moment]:
         """One episode, with the mode of the policy; start: the observation of its first state."""
         placer = None if start is None else Placer(self.environment)
-        self._lane.reset(seed)
+        observation = self._lane.reset(seed)
         if placer is not None:
             placer.put(start)
-            self._lane.seen = start
+            observation = start
         moment = Moment()
         yield moment
         while not moment.end:
-            act(self._policy, self._lane, self._source, None, deterministic=True)
-            _, reward, terminated, truncated = self._lane.step()
+            self._lane.action[:] = self._policy._predict_rows(observation)
+            observation, reward, terminated, truncated = self._lane.step()
             moment = moment.after(reward, terminated, truncated)
             yield moment
 

@@ -20,7 +20,7 @@ class Predictor(Protocol):
     ) -> tuple[Any, Any]: ...
 
 
-class Seen(Lane):
+class _Seen(Lane):
     """A lane that keeps the last observation as the environment gave it, which is what predict() takes."""
 
     seen: Any
@@ -45,7 +45,7 @@ def _executed(action: Any, source: Source) -> np.ndarray | None:
     return index if index[0] in range(spec["n"]) else None
 
 
-def act(model: Predictor, lane: Seen, source: Source, state: Any, deterministic: bool) -> Any:
+def _act(model: Predictor, lane: _Seen, source: Source, state: Any, deterministic: bool) -> Any:
     """Asks for the next action and puts it into the lane; returns the model's new state."""
     start = np.array([lane.steps == 0])
     action, state = model.predict(
@@ -74,11 +74,11 @@ def record(
                     "truncations", "episodes")
     }  # fmt: skip
     try:
-        lane = source.lane(Seen)
+        lane = source.lane(_Seen)
         for episode in range(episodes):
             observation, state, ended = lane.reset(seed + episode), None, False
             while not ended:
-                state = act(model, lane, source, state, deterministic)
+                state = _act(model, lane, source, state, deterministic)
                 following, reward, terminated, truncated = lane.step()
                 ended = terminated or truncated
                 values = (observation, following, lane.action.copy(), reward, terminated, truncated)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from agail import _core
-from agail._core import Policy
+from agail._core import InputError, Policy
 from agail._extension import Parser, missing, run, unwritten
 
 if TYPE_CHECKING:
@@ -138,7 +138,9 @@ def export(policy: Policy, path: str | os.PathLike[str]) -> None:
     """
     data = to_onnx(policy).SerializeToString()
     path = Path(path)
-    part = path.with_name(f".{path.name}.tmp")
+    if not path.name or path.is_dir():
+        raise InputError(f"{path}: cannot be written, it is a folder; give another --out")
+    part = path.with_name(f".{path.name[:40]}.{os.getpid()}.tmp")
     try:
         part.write_bytes(data)
         part.replace(path)

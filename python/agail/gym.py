@@ -95,7 +95,7 @@ class NativeVectorEnv(VectorEnv[np.ndarray, Any, np.ndarray]):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         mask = (options or {}).get("reset_mask")
         chosen = np.ones(self.num_envs, bool) if mask is None else np.asarray(mask, bool)
-        self._one_each("entries of reset_mask", len(chosen))
+        self._one_each("entries of reset_mask", chosen.size)
         begin = chosen & ~self._seeded  # those that do not go on with the seed that they had
         seeds = [0] * self.num_envs
         if isinstance(seed, list | tuple):

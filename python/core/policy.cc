@@ -116,14 +116,6 @@ class Policy {
     return nb::make_tuple(layout.attr("own_actions")(actions, single), state);
   }
 
- private:
-  static std::string text_of(std::span<const Py_ssize_t> shape) {
-    std::string text = "(";
-    for (std::size_t i = 0; i < shape.size(); ++i)
-      text += (i == 0 ? "" : ", ") + std::to_string(shape[i]);
-    return text + (shape.size() == 1 ? ",)" : ")");
-  }
-
   // Of one observation or a batch, all numbers in a row and counted from 0.
   nb::object flat_actions(const nb::object& observation, bool deterministic) {
     std::optional<Buffer> input(std::in_place, observation, "d");
@@ -142,13 +134,21 @@ class Policy {
       const nb::object actions =
           numpy_.empty(single ? nb::make_tuple() : nb::make_tuple(n), NumPy::kInt64);
       std::copy(indices.begin(), indices.end(), Buffer(actions, "l").data<std::int64_t>());
-      return actions;
+      return single ? nb::object(actions[nb::make_tuple()]) : actions;  // a number, not an array
     }
     const int width = policy_.action().dim;
     const nb::object actions =
         numpy_.empty(single ? nb::make_tuple(width) : nb::make_tuple(n, width), NumPy::kFloat32);
     act(rows, n, Buffer(actions, "f").data<float>(), deterministic);
     return actions;
+  }
+
+ private:
+  static std::string text_of(std::span<const Py_ssize_t> shape) {
+    std::string text = "(";
+    for (std::size_t i = 0; i < shape.size(); ++i)
+      text += (i == 0 ? "" : ", ") + std::to_string(shape[i]);
+    return text + (shape.size() == 1 ? ",)" : ")");
   }
 
   void act(const double* observations, std::size_t n, float* actions, bool deterministic) {
@@ -267,6 +267,9 @@ void bind_policy(nb::module_& module) {
       .def("predict", &Policy::predict, nb::arg("observation"), nb::arg("state") = nb::none(),
            nb::arg("episode_start") = nb::none(), nb::arg("deterministic") = true,
            nb::sig(kPredictSignature), kPredictHelp)
+      .def("_predict_rows", &Policy::flat_actions, nb::arg("observation"),
+           nb::arg("deterministic") = true,
+           "The actions for observations as numbers in a row, (D,) or (n, D), counted from 0.")
       .def("seed", &Policy::seed, nb::arg("seed").none(),
            nb::sig("def seed(self, seed: int) -> None"),
            "Names the random numbers of stochastic actions from here on.")

@@ -83,9 +83,9 @@ TEST_F(BcoTest, LearnsFromStatesAloneWhatTheDemonstratorDid) {
 
   const Vector<float> before = theta;
   CloningTargets targets;
-  EXPECT_FALSE(bco.update(own(), 0, false, theta, targets));
+  EXPECT_FALSE(bco.update(own(), 0, theta, targets));
   EXPECT_EQ(theta, before);  // in the middle of a round
-  const std::optional<BcoReport> report = bco.update(own(), 1, false, theta, targets);
+  const std::optional<BcoReport> report = bco.update(own(), 1, theta, targets);
   ASSERT_TRUE(report);
   EXPECT_GT(report->inverse_dynamics.quality, 0.98);
   EXPECT_GT(report->cloning.quality, 0.95);

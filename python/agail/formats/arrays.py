@@ -29,7 +29,12 @@ def _actions(where: str, actions: Any, available: Any, rows: int) -> tuple[np.nd
     if len(act) != rows:
         raise InputError(f"actions have the shape {act.shape}, the observations {rows} rows")
     if available is not None:
-        known = numbers(where, "action_available", available, (1, 2)).astype(bool)
+        known = numbers(where, "action_available", available, (1, 2))
+        if not np.isin(known, (0, 1)).all():
+            raise InputError(
+                f"{where}: action_available has values other than 0 (missing) and 1 (known)"
+            )
+        known = known.astype(bool)
         known = known[:, None] if known.ndim == 1 else known
         if known.shape not in ((rows, 1), act.shape):
             raise InputError(f"action_available has the shape {known.shape}, not {act.shape}")

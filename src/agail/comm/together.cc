@@ -28,9 +28,10 @@ JobFailure current_failure() {
   } catch (const InputError& error) {
     return {2, one_line(error.what())};
   } catch (const std::bad_alloc&) {
-    return {2,
-            "there is not enough memory; lower run.batch_steps, hidden layers or minibatches, use "
-            "fewer demonstrations, or a machine or container with more"};
+    return {
+        2,
+        "there is not enough memory; use smaller batches, layers, minibatches or buffers, fewer "
+        "demonstrations, or a machine or container with more"};
   } catch (const std::exception& error) {
     return {1, one_line(error.what())};
   }

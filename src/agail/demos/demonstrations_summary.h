@@ -12,7 +12,7 @@ struct DemonstrationsSummary {
   std::size_t episodes = 0;
   Eigen::Index transitions = 0;
   double missing_ratio = 0;           // eta
-  std::optional<double> mean_return;  // finite; absent if the file has no rewards
+  std::optional<double> mean_return;  // finite; absent if the file has no rewards, or their sum overflows
   std::uint32_t fingerprint = 0;      // of states, known actions, rewards and endings
 };
 

@@ -76,7 +76,9 @@ std::vector<std::string> episode_names(const hdf5::Group& root) {
     const char* end = name.data() + name.size();
     const auto [stop, error] = std::from_chars(name.data() + kPrefix.size(), end, number);
     if (error != std::errc{} || stop != end) {
-      if (kind == hdf5::Kind::kDataset) continue;  // somebody's array, no episode
+      const char first = (name + '-')[kPrefix.size()];
+      const bool numeric = first == '-' || first == '+' || (first >= '0' && first <= '9');
+      if (kind == hdf5::Kind::kDataset || !numeric) continue;  // somebody's own, no episode
       throw InputError(root.where(name) +
                        " is no episode number; name the groups episode_0, episode_1, ...");
     }

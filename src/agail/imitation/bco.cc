@@ -68,14 +68,13 @@ RegressionReport BehaviorCloningFromObservation::learn_inverse_dynamics(std::uin
 }
 
 std::optional<BcoReport> BehaviorCloningFromObservation::update(const Batch& batch,
-                                                                std::uint32_t update, bool last,
+                                                                std::uint32_t update,
                                                                 Vector<float>& theta,
                                                                 CloningTargets& targets) {
   keep(batch);
   const auto every = static_cast<std::uint32_t>(settings_.bco.every);
-  const bool shorter_than_a_round = last && update + 1 < every;
-  if ((update + 1) % every != 0 && !shorter_than_a_round) return std::nullopt;
-  const std::uint32_t round = update / every + 1;
+  if ((update + 1) % every != 0) return std::nullopt;
+  const std::uint32_t round = (update + 1) / every;
   targets.columns.resize(static_cast<std::size_t>(demos_.size()));
   std::iota(targets.columns.begin(), targets.columns.end(), Index{0});
   BcoReport report;

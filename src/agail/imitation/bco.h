@@ -26,10 +26,9 @@ class BehaviorCloningFromObservation {
 
   // Keeps the batch's transitions. At the end of a round fits inverse dynamics, fills in `targets`
   // and fits theta to them, networks from where they are; continuous actions explore with
-  // start.log_std from then on. `update` numbers the batches from 0; the `last` one ends the first
-  // round, too, lest a short run have none.
-  std::optional<BcoReport> update(const Batch& batch, std::uint32_t update, bool last,
-                                  Vector<float>& theta, CloningTargets& targets);
+  // start.log_std from then on. `update` numbers the batches from 0.
+  std::optional<BcoReport> update(const Batch& batch, std::uint32_t update, Vector<float>& theta,
+                                  CloningTargets& targets);
 
   void archive(Archive& a);
 

@@ -28,6 +28,9 @@ std::map<std::string, std::string> identity(const Trainer& trainer) {
                                                {"seed", std::to_string(task.seed)},
                                                {"settings", to_toml(settings)},
                                                {"demonstrations", "none"}};
+  // Parameters of a policy that learns in units of its own mean nothing in the environment's.
+  const ActionSpace& action = environment_spec(task.environment).action;
+  if (ActionUnits(action).space() != action) result["action_units"] = "bounds";
   if (trainer.demonstrations())
     result["demonstrations"] = "crc32c:" + std::to_string(trainer.demonstrations()->fingerprint);
   return result;

@@ -259,6 +259,14 @@ void Run::train() {
 
   must_stop();
   outcome_.timesteps = trainer.timesteps();
+  const Settings& settings = trainer.task().settings;
+  if (first_ && options_.shows_progress && trainer.task().method == "bco" &&
+      outcome_.timesteps < settings.bco.every * settings.run.batch_steps)
+    std::fprintf(
+        stderr,
+        "agail: note: this was less than bco's first round of %lld steps, so the policy is "
+        "still random; give more timesteps, or lower bco.every or run.batch_steps\n",
+        static_cast<long long>(settings.bco.every * settings.run.batch_steps));
   const Traffic traffic = total_of(communicator_, communicator_.traffic());
   if (!first_) return;
   log_->finish();

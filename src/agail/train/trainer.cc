@@ -208,11 +208,13 @@ void Trainer::check_finite(const UpdateReport& report) const {
     throw InputError("training diverged after " + std::to_string(timesteps_) + " steps: " + what +
                      " is not finite; lower " + setting);
   };
+  if (!rewards_.allFinite())
+    fail("the reward",
+         reward_ ? "discriminator.learning_rate, guide.learning_rate or the weights of the rewards"
+                 : "the scale of the rewards");
   if (!value_.finite()) fail("the value network", "value.learning_rate");
   if (report.trpo && !std::isfinite(report.trpo->gradient_norm))
-    fail("the policy's gradient", reward_ ? "discriminator.learning_rate, guide.learning_rate or "
-                                            "the weights of the rewards"
-                                          : "value.learning_rate or the scale of the rewards");
+    fail("the policy's gradient", "value.learning_rate or the scale of the rewards");
 }
 
 UpdateReport Trainer::update() {
@@ -234,7 +236,7 @@ UpdateReport Trainer::update() {
   diverged_ += batch_.diverged;
 
   if (bco_)
-    report.bco = bco_->update(batch_, number, finished(), theta_, targets_);
+    report.bco = bco_->update(batch_, number, theta_, targets_);
   else
     learn(report);
   if (exploring_rounds_ && report.bco && --*exploring_rounds_ == 0) bco_.reset();
