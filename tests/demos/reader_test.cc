@@ -187,6 +187,7 @@ TEST(Reader, ArraysBesideTheEpisodesAreIgnored) {
     const double lengths[] = {3};
     root.write("episode_lengths", {1}, Type::kFloat64, lengths);
     root.create_group("trajectory_-1");
+    root.create_group("episode_metadata");
   };
   EXPECT_EQ(plain.read().transitions(), 3);
 }

@@ -104,6 +104,7 @@ def test_from_arrays_with_ends():
         ({"observations": np.zeros((60, 12))}, "Hopper-v5"),
         ({"environment": "no id"}, "Gymnasium id"),
         ({"action_available": np.ones((60, 2))}, "action_available"),
+        ({"action_available": np.full(60, np.nan)}, "other than 0"),
         ({"environment": "agail/Hopper-v5", "observations": np.zeros((60, 12))}, "Hopper-v5"),
         ({"observations": [["a"]]}, "observations are <U1, not numbers"),
         ({"observations": [[1, 2], [3]]}, "observations are no array of numbers"),
