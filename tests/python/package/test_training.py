@@ -211,6 +211,16 @@ ENDLESS = """
 """
 
 
+def start_python(script):
+    """With SIGINT as a terminal has it: a shell ignores it for what it runs in the background."""
+    return subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(script)],
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("function", ["evaluate", "record"])
 def test_episodes_can_be_interrupted(tmp_path, function, number):
@@ -223,8 +233,7 @@ def test_episodes_can_be_interrupted(tmp_path, function, number):
             f"agail.{function}({str(tmp_path / run)!r}, 10**6, environment={environment}, threads=1)"
         )
         script = ENDLESS.format(tests=str(Path(__file__).parent), truncates=False, work=work)
-        process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)],
-                                   stdout=subprocess.PIPE, text=True)  # fmt: skip
+        process = start_python(script)
         assert process.stdout.readline() == "step\n"
         if environment is None:
             time.sleep(0.5)  # the episodes have begun
@@ -242,8 +251,7 @@ def test_second_ctrl_c_ends_an_evaluation_that_never_ends():
     """The evaluation of an update is whole for the first one; the second one aborts all its episodes."""
     work = 'train(Told, method="trpo", timesteps=256, run={"evaluate_every": 1})'
     script = ENDLESS.format(tests=str(Path(__file__).parent), truncates=False, work=work)
-    process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)],
-                               stdout=subprocess.PIPE, text=True)  # fmt: skip
+    process = start_python(script)
     for _ in range(2):  # the episode of the batch, and that of the evaluation
         assert process.stdout.readline() == "step\n"
     process.send_signal(signal.SIGINT)
