@@ -106,14 +106,14 @@ class Policy {
                     bool deterministic) {
     if (policy_.info().layout.empty())
       return nb::make_tuple(flat_actions(observation, deterministic), state);
-    const nb::object layout =
-        nb::module_::import_("agail._layout")
-            .attr("PolicyLayout")(policy_.info().layout, policy_.observation_dim(),
-                                  policy_.action().dim, policy_.action().discrete);
-    const nb::object found = layout.attr("rows")(observation);
+    if (!layout_.is_valid())
+      layout_ = nb::module_::import_("agail._layout")
+                    .attr("PolicyLayout")(policy_.info().layout, policy_.observation_dim(),
+                                          policy_.action().dim, policy_.action().discrete);
+    const nb::object found = layout_.attr("rows")(observation);
     const nb::object rows = found[0], single = found[1];
     const nb::object actions = flat_actions(rows, deterministic);
-    return nb::make_tuple(layout.attr("own_actions")(actions, single), state);
+    return nb::make_tuple(layout_.attr("own_actions")(actions, single), state);
   }
 
   // Of one observation or a batch, all numbers in a row and counted from 0.
@@ -196,6 +196,7 @@ class Policy {
   };
 
   SavedPolicy policy_;
+  nb::object layout_;  // agail._layout.PolicyLayout, made when it is first needed
   NumPy numpy_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<SavedPolicy::Workspace>> idle_;

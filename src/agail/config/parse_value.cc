@@ -61,9 +61,7 @@ bool read(const toml::node& node, std::optional<double>& out) {
 std::string shown(const toml::node& node) {
   std::ostringstream stream;
   stream << toml::node_view<const toml::node>(node);
-  std::string text = stream.str();
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < ' '; }, ' ');
+  const std::string text = one_line(stream.str());
   return text.size() > 60 ? text.substr(0, 57) + "..." : text;
 }
 

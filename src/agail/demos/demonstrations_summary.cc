@@ -42,8 +42,10 @@ DemonstrationsSummary summarise(const Demonstrations& demonstrations) {
   summary.transitions = demonstrations.transitions();
   summary.missing_ratio = demonstrations.missing_ratio();
   // Finite rewards can have an infinite sum.
-  if (demonstrations.has_rewards() && std::isfinite(demonstrations.mean_return()))
-    summary.mean_return = demonstrations.mean_return();
+  if (demonstrations.has_rewards()) {
+    const double mean_return = demonstrations.mean_return();
+    if (std::isfinite(mean_return)) summary.mean_return = mean_return;
+  }
   summary.fingerprint = fingerprint_of(demonstrations);
   return summary;
 }

@@ -28,11 +28,6 @@ std::string text_of(const json& metadata, const char* key) {
                                                              : "";
 }
 
-// What is no UTF-8 is replaced.
-std::string dump(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
 // The metadata of a single file: the attributes of its root, Minari's, ours and whoever's, that are
 // one text, number or boolean.
 json root_metadata(const hdf5::Group& root) {
@@ -76,8 +71,8 @@ std::vector<std::string> episode_names(const hdf5::Group& root) {
     const char* end = name.data() + name.size();
     const auto [stop, error] = std::from_chars(name.data() + kPrefix.size(), end, number);
     if (error != std::errc{} || stop != end) {
-      const char first = (name + '-')[kPrefix.size()];
-      const bool numeric = first == '-' || first == '+' || (first >= '0' && first <= '9');
+      const std::string rest = name.substr(kPrefix.size());
+      const bool numeric = rest.empty() || rest.find_first_of("+-0123456789") == 0;
       if (kind == hdf5::Kind::kDataset || !numeric) continue;  // somebody's own, no episode
       throw InputError(root.where(name) +
                        " is no episode number; name the groups episode_0, episode_1, ...");
@@ -209,7 +204,7 @@ Demonstrations read(const hdf5::Group& root, const json& metadata, const std::st
                            : ""));
   }
   if (metadata.contains("total_episodes") && metadata["total_episodes"] != names.size())
-    throw InputError(where + " says there are " + dump(metadata["total_episodes"]) +
+    throw InputError(where + " says there are " + json_text(metadata["total_episodes"]) +
                      " episodes, the file holds " + std::to_string(names.size()) +
                      "; it is incomplete, copy or record it again");
   const std::optional<DiscreteSpace> discrete = discrete_space_from_json(
@@ -241,7 +236,7 @@ Demonstrations read(const hdf5::Group& root, const json& metadata, const std::st
   demonstrations.actions_are_float32 = !any_actions || float32;
   for (RawEpisode& episode : episodes)
     demonstrations.episodes.push_back(finish(std::move(episode), demonstrations.action));
-  if (!metadata.empty()) demonstrations.metadata = dump(metadata);
+  if (!metadata.empty()) demonstrations.metadata = json_text(metadata);
   return demonstrations;
 }
 

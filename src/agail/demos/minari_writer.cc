@@ -145,15 +145,11 @@ ordered_json metadata_of(const Demonstrations& demonstrations) {
   return metadata;
 }
 
-std::string dump(const ordered_json& value) {
-  return value.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
-
 void check_key(const std::string& key) {
   constexpr std::size_t kMostBytes = 65534;  // that HDF5 can keep
   if (!key.empty() && key.size() <= kMostBytes && key.find('\0') == std::string::npos) return;
   throw InputError("the metadata have a key of " + std::to_string(key.size()) + " bytes, " +
-                   dump(key.substr(0, 40)) +
+                   json_text(ordered_json(key.substr(0, 40))) +
                    ", that an HDF5 file cannot keep; rename it, or write a dataset folder");
 }
 
@@ -172,7 +168,7 @@ void write_attributes(Group& root, const ordered_json& metadata) {
     } else if (value.is_number()) {
       root.write_attribute(key, value.get<double>());
     } else {
-      root.write_attribute(key, dump(value));
+      root.write_attribute(key, json_text(value));
     }
   }
 }
@@ -190,7 +186,7 @@ void write_folder(const Demonstrations& demonstrations, const std::string& path)
     });
     // Megabytes to one decimal, as Minari has it.
     metadata["dataset_size"] = std::round(static_cast<double>(fs::file_size(data)) / 1e5) / 10;
-    write_file_atomically(folder / "data" / "metadata.json", dump(metadata));
+    write_file_atomically(folder / "data" / "metadata.json", json_text(metadata));
   });
 }
 

@@ -16,6 +16,12 @@ namespace agail {
 template <class Json = nlohmann::json>
 Json parse_python_json(const std::string& text, const std::string& where);
 
+// In one line; what is no UTF-8 is replaced.
+template <class Json>
+std::string json_text(const Json& value) {
+  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 // {"type": "Box", ...} or {"type": "Discrete", ...}.
 std::string action_space_to_json(const ActionSpace& space, bool is_float32);
 std::string observation_space_to_json(int dim, bool is_float32);

@@ -5,17 +5,6 @@
 #include "agail/rl/action_units.h"
 
 namespace agail {
-namespace {
-
-// As the environment takes it: a policy's actions, which are compared with these, are executed
-// within the bounds, too.
-float within_bounds(const ActionSpace& space, Index i, float action) {
-  if (space.discrete) return action;
-  const auto entry = static_cast<std::size_t>(i);
-  return std::clamp(action, space.low[entry], space.high[entry]);
-}
-
-}  // namespace
 
 DemoData::DemoData(const Demonstrations& demos) {
   const Index n = demos.transitions();
@@ -33,8 +22,7 @@ DemoData::DemoData(const Demonstrations& demos) {
       Index known = 0;
       for (Index i = 0; i < dim; ++i) {
         if (episode.available(t, i) == 0) continue;  // what stands in a missing entry is never read
-        actions(i, column) = units.from_environment(
-            i, within_bounds(demos.action, i, static_cast<float>(episode.actions(t, i))));
+        actions(i, column) = units.from_environment(i, static_cast<float>(episode.actions(t, i)));
         available(i, column) = 1;
         ++known;
       }

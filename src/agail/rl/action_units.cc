@@ -16,34 +16,31 @@ bool is_kept(double low, double high) {
 
 }  // namespace
 
-ActionUnits::ActionUnits(const ActionSpace& space) : environment_(space), space_(space) {
+ActionUnits::ActionUnits(const ActionSpace& space)
+    : environment_(space), space_(space), units_(static_cast<std::size_t>(space.dim)) {
   for (std::size_t i = 0; i < space.low.size(); ++i) {
     const double low = static_cast<double>(space.low[i]), high = static_cast<double>(space.high[i]);
-    Unit& unit = units_.emplace_back();
     if (is_kept(low, high)) continue;
-    unit = {.centre = (low + high) / 2, .scale = (high - low) / 2, .own = false};
+    units_[i] = {.centre = (low + high) / 2, .scale = (high - low) / 2, .own = false};
     space_.low[i] = -1;
     space_.high[i] = 1;
   }
 }
 
 void ActionUnits::execute(const float* u, float* a) const {
-  if (environment_.discrete) {
-    a[0] = u[0];
-    return;
-  }
-  for (std::size_t i = 0; i < units_.size(); ++i) {
-    const Unit& unit = units_[i];
-    const float action =
-        unit.own ? u[i] : static_cast<float>(unit.centre + unit.scale * static_cast<double>(u[i]));
-    a[i] = std::clamp(action, environment_.low[i], environment_.high[i]);
-  }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(environment_.dim); ++i)
+    a[i] = units_[i].own
+               ? u[i]
+               : static_cast<float>(units_[i].centre + units_[i].scale * static_cast<double>(u[i]));
+  clip_action(environment_, a, a);
 }
 
-float ActionUnits::from_environment(Index i, float a) const {
+float ActionUnits::from_environment(Index entry, float a) const {
+  const auto i = static_cast<std::size_t>(entry);
   if (environment_.discrete) return a;
-  const Unit& unit = units_[static_cast<std::size_t>(i)];
-  return unit.own ? a : static_cast<float>((static_cast<double>(a) - unit.centre) / unit.scale);
+  const float executed = std::clamp(a, environment_.low[i], environment_.high[i]);
+  if (units_[i].own) return executed;
+  return static_cast<float>((static_cast<double>(executed) - units_[i].centre) / units_[i].scale);
 }
 
 Vector<float> ActionUnits::in_environment(const PolicyNetwork<float>& network,

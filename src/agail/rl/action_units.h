@@ -5,6 +5,9 @@
 
 namespace agail {
 
+// The action within the bounds of `space`.
+void clip_action(const ActionSpace& space, const float* sampled, float* executed);
+
 // Networks, exploration noise and step sizes are made for numbers about 1; an environment's actions
 // may be percent, newtons or a register's 0 to 255. So learners see u = (a - centre) / scale, in
 // which a dimension's bounds are -1 and 1. Bounds that are symmetric and from 1/4 to 1 (those of
@@ -19,7 +22,8 @@ class ActionUnits {
   // What the environment executes for u: a within its bounds. Both: dim numbers; may be the same.
   void execute(const float* u, float* a) const;
 
-  // Entry i of an action, in these units.
+  // Entry i of a demonstrated action, in these units and within the bounds: a policy's actions,
+  // which are compared with it, are executed within them, too.
   float from_environment(Index i, float a) const;
 
   // The same policy, which takes u (parameters theta), with outputs in the environment's units:
@@ -32,7 +36,7 @@ class ActionUnits {
     bool own = true;  // the environment's: nothing is to be done
   };
   ActionSpace environment_, space_;
-  std::vector<Unit> units_;  // of each continuous dimension
+  std::vector<Unit> units_;  // of each entry
 };
 
 }  // namespace agail

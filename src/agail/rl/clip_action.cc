@@ -1,7 +1,7 @@
 // Apart from the collector, so that a policy can be used without environments.
 #include <algorithm>
 
-#include "agail/rl/rollout.h"
+#include "agail/rl/action_units.h"
 
 namespace agail {
 

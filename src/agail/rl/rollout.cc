@@ -22,7 +22,8 @@ Collector::Collector(const std::string& environment, Index lanes, std::uint64_t 
     : seed_(seed),
       team_(team),
       own_(share_of(lanes, team.ranks(), team.rank())),
-      lanes_(static_cast<std::size_t>(lanes)) {
+      lanes_(static_cast<std::size_t>(lanes)),
+      units_(environment_spec(environment).action) {
   if (lanes < team.ranks())
     throw InputError("setting run.lanes = " + std::to_string(lanes) + " is less than the " +
                      std::to_string(team.ranks()) +
@@ -33,7 +34,6 @@ Collector::Collector(const std::string& environment, Index lanes, std::uint64_t 
     lane.environment = make_environment(environment);
     lane.finished.reserve(4096);
   }
-  units_.emplace(spec().action);
 }
 
 void Collector::start_episode(Index index) {
@@ -106,7 +106,7 @@ void Collector::act(Index index, const PolicyNetwork<float>& network, const Vect
     float* action = batch.actions.col(j).data();
     network.distribution.sample(worker.tape.outputs.back().data(), network.log_std(theta.data()),
                                 random, action);
-    units_->execute(action, worker.executed.data());
+    units_.execute(action, worker.executed.data());
 
     const Clock::time_point before = Clock::now();
     const StepResult result = environment.step(worker.executed);
@@ -161,7 +161,7 @@ void Collector::replay(const Batch& batch) {
     std::vector<float> executed(static_cast<std::size_t>(spec().action.dim));
     if (lane.episode < 0) start_episode(index);
     for (Index t = first; t < end; ++t) {
-      units_->execute(batch.actions.col(index * batch.steps + t).data(), executed.data());
+      units_.execute(batch.actions.col(index * batch.steps + t).data(), executed.data());
       const StepResult result = lane.environment->step(executed);
       lane.episode_return += result.reward;
       if (result.terminated || result.truncated) start_episode(index);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,9 +45,6 @@ struct Batch {
   std::vector<FinishedEpisode> finished;
   std::int64_t diverged = 0;  // episodes that ended because the simulation broke down
 };
-
-// The action within the bounds of `space`.
-void clip_action(const ActionSpace& space, const float* sampled, float* executed);
 
 class Collector {
  public:
@@ -108,7 +104,7 @@ class Collector {
   Team team_;
   Share own_;  // this rank's lanes
   std::vector<Lane> lanes_;
-  std::optional<ActionUnits> units_;  // once there is an environment
+  ActionUnits units_;
   struct Turn {
     Index lane, step;
   };

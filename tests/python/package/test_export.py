@@ -10,7 +10,7 @@ import numpy as np
 import onnxruntime
 import pytest
 from small import train
-from test_gymnasium import Discretes
+from test_spaces import Discretes
 
 import agail
 from agail import _core

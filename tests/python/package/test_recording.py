@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 from small import Line
-from test_gymnasium import Discretes, broken
+from test_gymnasium import broken
+from test_spaces import Discretes
 
 import agail
 

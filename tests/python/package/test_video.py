@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 from small import train
-from test_gymnasium import Discretes
+from test_spaces import Discretes
 
 import agail
 from agail import _core
