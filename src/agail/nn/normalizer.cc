@@ -15,6 +15,15 @@ constexpr double kVarianceFloor = 1e-2;
 std::span<double> span_of(Vector<double>& v) {
   return {v.data(), static_cast<std::size_t>(v.size())};
 }
+
+// y = clip((x - shift) scale, -limit, limit) for n numbers. y may be x.
+template <int n>
+void normalize(const float* x, const float* shift, const float* scale, float limit, float* y) {
+  using Numbers = Eigen::Array<float, n, 1>;
+  using Given = Eigen::Map<const Numbers>;
+  Eigen::Map<Numbers> out(y);
+  out = ((Given(x) - Given(shift)) * Given(scale)).max(-limit).min(limit);
+}
 }  // namespace
 
 Normalizer::Normalizer(Index size, bool enabled, double clip)
@@ -78,21 +87,19 @@ void Normalizer::refresh() {
 }
 
 void Normalizer::apply(const float* x, float* y) const {
-  const Index n = mean_.size();
-  const auto limit = static_cast<float>(clip_);
   // Some at a time: of all together Eigen would make packets that slow the physics (product.h).
   constexpr int kNarrow = kNarrowBytes / sizeof(float);
-  using Block = Eigen::Array<float, Eigen::Dynamic, 1, 0, kNarrow, 1>;
-  for (Index i = 0; i < n; i += kNarrow) {
-    const Index count = std::min<Index>(kNarrow, n - i);
-    const Eigen::Map<const Block> in(x + i, count);
-    Eigen::Map<Block> out(y + i, count);
-    if (enabled_)
-      out = ((in - shift_.segment(i, count).array()) * scale_.segment(i, count).array())
-                .max(-limit)
-                .min(limit);
-    else
-      out = in;
+  const Index n = mean_.size();
+  if (enabled_) {
+    const auto limit = static_cast<float>(clip_);
+    const float* shift = shift_.data();
+    const float* scale = scale_.data();
+    Index i = 0;
+    for (; i + kNarrow <= n; i += kNarrow)
+      normalize<kNarrow>(x + i, shift + i, scale + i, limit, y + i);
+    for (; i < n; ++i) normalize<1>(x + i, shift + i, scale + i, limit, y + i);
+  } else {
+    std::copy_n(x, n, y);
   }
   y[n] = 1;
 }

@@ -92,6 +92,8 @@ template <class V, int P, int N, class S = Scalar<V>>
     for (int i = 0; i < P; ++i) sum[i][j] = pset1<V>(S(0));
   }
   for (Index p = 0; p < depth; ++p, a.data += a.step, b.data += b.step) {
+    if constexpr (N == 1)  // observations have channels at rest, whose weights need not be fetched
+      if (b.data[0] == S(0)) continue;
     V left[P];
     AGAIL_UNROLL
     for (int i = 0; i + 1 < P; ++i) left[i] = ploadu<V>(a.data + i * kLanes<V>);
