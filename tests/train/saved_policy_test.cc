@@ -1,5 +1,6 @@
 #include "agail/train/saved_policy.h"
 
+#include "agail/train/safetensors.h"
 #include "base/messages.h"
 #include "train/plain_policy.h"
 
@@ -51,6 +52,16 @@ TEST(SavedPolicy, RefusesALayoutThatDoesNotFit) {
     EXPECT_THAT(refused("observation_start", start), nonsense);
     EXPECT_THAT(refused("action_start", start), nonsense);
   }
+}
+
+// Before there is memory for them.
+TEST(SavedPolicy, RefusesAStructureOfMoreWeightsThanTheFileHas) {
+  TensorStore store = shaped_policy({}).store();
+  std::string& structure = store.metadata.at("structure");
+  const std::string hidden = "\"hidden\":[4]";
+  structure.replace(structure.find(hidden), hidden.size(), "\"hidden\":[1048576,1048576]");
+  const std::vector<std::uint8_t> bytes = to_safetensors(store);
+  EXPECT_THAT(input_error([&] { SavedPolicy::decode(bytes, "p"); }), HasSubstr("more weights"));
 }
 
 }  // namespace

@@ -214,6 +214,11 @@ SavedPolicy SavedPolicy::decode(std::span<const std::uint8_t> bytes, const std::
           standard_deviation);
     }
     const PolicyNetwork<float> network(observation_dim, hidden, action);
+    if (static_cast<std::size_t>(network.parameters()) > bytes.size() / sizeof(float))
+      throw InputError(
+          where +
+          ": the structure in its metadata is of more weights than the file has; train "
+          "or export the policy again");
     Vector<float> theta(network.parameters());
     for (Index l = 0; l < network.mlp.layers(); ++l) {
       const Index out = network.mlp.sizes()[static_cast<std::size_t>(l) + 1];
