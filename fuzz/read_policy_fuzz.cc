@@ -36,6 +36,13 @@ agail::TensorStore plain_policy(bool discrete) {
   return policy.store();
 }
 
+// Of ASCII: what is not UTF-8 cannot be written.
+std::string text(FuzzedDataProvider& data) {
+  std::string result = data.ConsumeRandomLengthString(64);
+  for (char& c : result) c = static_cast<char>(c & 127);
+  return result;
+}
+
 json number_or_so(FuzzedDataProvider& data) {
   switch (data.ConsumeIntegralInRange(0, 7)) {
     case 0:
@@ -45,7 +52,7 @@ json number_or_so(FuzzedDataProvider& data) {
     case 2:
       return data.ConsumeFloatingPoint<double>();
     case 3:
-      return data.ConsumeRandomLengthString(8);
+      return text(data);
     case 4:
       return data.ConsumeBool();
     case 5:
@@ -68,7 +75,7 @@ void change(FuzzedDataProvider& data, agail::TensorStore& store) {
   };
   switch (data.ConsumeIntegralInRange(0, 4)) {
     case 0:
-      any(store.metadata)->second = data.ConsumeRandomLengthString();
+      any(store.metadata)->second = text(data);
       break;
     case 1: {
       constexpr std::array<const char*, 10> kKeys = {
