@@ -130,7 +130,7 @@ void Trainer::start() {
   if (infers)
     require_memory(memory_to_fit(n, 2 * inputs, settings.inverse_dynamics.hidden, spec_.action,
                                  RegressionSettings().validation_share) +
-                       demos_->states.size() * sizeof(float),
+                       static_cast<std::size_t>(demos_->states.size()) * sizeof(float),
                    "inferring the missing actions of these demonstrations");
   if (clones)
     require_memory(memory_to_fit(n, inputs, settings.policy.hidden, spec_.action,
