@@ -44,7 +44,8 @@ std::string zip(const std::vector<Member>& members) {
     put(directory, 0x02014b50, 4);
     put(directory, 20, 2);
     directory += common;
-    put(directory, 0, 10);  // comment, disk, attributes
+    put(directory, 0, 4);  // comment, disk
+    put(directory, 0, 6);  // attributes
     put(directory, bytes.size(), 4);
     directory += member.name;
     put(bytes, 0x04034b50, 4);

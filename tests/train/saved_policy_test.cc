@@ -54,13 +54,33 @@ TEST(SavedPolicy, RefusesALayoutThatDoesNotFit) {
   }
 }
 
+// The bytes of a policy whose structure says `instead` where it said `of`.
+std::vector<std::uint8_t> with_structure(const std::string& of, const std::string& instead) {
+  TensorStore store = shaped_policy({{"action_start", Numbers{7}}}).store();
+  std::string& structure = store.metadata.at("structure");
+  structure.replace(structure.find(of), of.size(), instead);
+  return to_safetensors(store);
+}
+
+TEST(SavedPolicy, RefusesNumbersThatAreNoCounts) {
+  for (const char* name : {"\"hidden\":[4]", "\"action_dim\":4", "\"observation_dim\":6",
+                           "\"layout\":{\"action_start\":[7]}"}) {
+    const std::string of = name;
+    const std::size_t number = of.find_first_of("0123456789");
+    for (const char* instead : {"-1.7e308", "4.5", "1e300", "4294967300", "true", "\"4\""}) {
+      const std::string wrong = of.substr(0, number) + instead + of.substr(number + 1);
+      if (of.find("start") != std::string::npos && wrong.find("4294967300") != std::string::npos)
+        continue;  // spaces may start there
+      EXPECT_THAT(input_error([&] { SavedPolicy::decode(with_structure(of, wrong), "p"); }),
+                  HasSubstr("makes no sense"))
+          << wrong;
+    }
+  }
+}
+
 // Before there is memory for them.
 TEST(SavedPolicy, RefusesAStructureOfMoreWeightsThanTheFileHas) {
-  TensorStore store = shaped_policy({}).store();
-  std::string& structure = store.metadata.at("structure");
-  const std::string hidden = "\"hidden\":[4]";
-  structure.replace(structure.find(hidden), hidden.size(), "\"hidden\":[1048576,1048576]");
-  const std::vector<std::uint8_t> bytes = to_safetensors(store);
+  const auto bytes = with_structure("\"hidden\":[4]", "\"hidden\":[1048576,1048576]");
   EXPECT_THAT(input_error([&] { SavedPolicy::decode(bytes, "p"); }), HasSubstr("more weights"));
 }
 

@@ -66,6 +66,20 @@ std::vector<float> bounds(const json& values) {
   return result;
 }
 
+// How many there are; 0 if that makes no sense. (json converts any number to any type, as it
+// comes.)
+int count_of(const json& value) {
+  constexpr int kLargest = 1 << 20;
+  return value.is_number_integer() && value >= 1 && value <= kLargest ? value.get<int>() : 0;
+}
+
+Sizes counts_of(const json& values) {
+  if (!values.is_array()) return {0};
+  Sizes result;
+  for (const json& value : values) result.push_back(count_of(value));
+  return result;
+}
+
 }  // namespace
 
 SavedPolicy::SavedPolicy(PolicyInfo info, int observation_dim, const ActionSpace& action,
@@ -168,41 +182,42 @@ SavedPolicy SavedPolicy::decode(std::span<const std::uint8_t> bytes, const std::
       info.demonstrations_mean_return = json::parse(mean).get<double>();
     ActionSpace action;
     action.discrete = structure.at("discrete");
-    action.dim = structure.at("action_dim");
+    action.dim = count_of(structure.at("action_dim"));
     if (action.discrete) {
-      action.n = structure.at("actions");
+      action.n = count_of(structure.at("actions"));
     } else {
       action.low = bounds(structure.at("action_low"));
       action.high = bounds(structure.at("action_high"));
     }
-    const int observation_dim = structure.at("observation_dim");
-    const Sizes hidden = structure.at("hidden");
-    constexpr std::int64_t kLargest = 1 << 20;
-    const auto sensible = [](std::int64_t v) { return v >= 1 && v <= kLargest; };
+    const int observation_dim = count_of(structure.at("observation_dim"));
+    const Sizes hidden = counts_of(structure.at("hidden"));
     const auto dim = static_cast<std::size_t>(action.dim);
-    info.layout = structure.value("layout", info.layout);
+    const json layout = structure.value("layout", json::object());
+    const bool of_integers = std::all_of(layout.begin(), layout.end(), [](const json& numbers) {
+      return std::all_of(numbers.begin(), numbers.end(),
+                         [](const json& number) { return number.is_number_integer(); });
+    });
+    // A shape of `size` numbers in all, or a start; there need not be one.
     const auto shape_fits = [&](const char* name, int size) {
-      const auto shape = info.layout.find(name);
-      if (shape == info.layout.end()) return true;
-      const std::vector<std::int64_t>& sides = shape->second;
-      return std::all_of(sides.begin(), sides.end(), sensible) &&
-             std::accumulate(sides.begin(), sides.end(), 1.0, std::multiplies<>()) == size;
+      if (!layout.contains(name)) return true;
+      const Sizes sides = counts_of(layout[name]);
+      return std::accumulate(sides.begin(), sides.end(), 1.0, std::multiplies<>()) == size;
     };
     const auto start_fits = [&](const char* name) {
-      const auto start = info.layout.find(name);
-      return start == info.layout.end() || start->second.size() == 1;
+      return !layout.contains(name) || layout[name].size() == 1;
     };
-    if (!sensible(observation_dim) || !std::all_of(hidden.begin(), hidden.end(), sensible) ||
-        !sensible(action.dim) ||
-        (action.discrete ? !sensible(action.n) || action.dim != 1
+    if (observation_dim == 0 || std::count(hidden.begin(), hidden.end(), 0) > 0 ||
+        action.dim == 0 ||
+        (action.discrete ? action.n == 0 || action.dim != 1
                          : action.low.size() != dim || action.high.size() != dim) ||
-        !shape_fits("observation_shape", observation_dim) ||
+        !of_integers || !shape_fits("observation_shape", observation_dim) ||
         !shape_fits("action_shape", action.dim) || !start_fits("observation_start") ||
         !start_fits("action_start"))
       throw InputError(
           where +
           ": the structure in its metadata makes no sense; train or export the policy again");
 
+    info.layout = layout.get<decltype(info.layout)>();
     Normalizer normalizer(observation_dim, structure.at("normalize_observations"),
                           structure.at("observation_clip"));
     Vector<double> standard_deviation = Vector<double>::Ones(observation_dim);
