@@ -63,11 +63,11 @@ std::vector<std::uint8_t> with_structure(const std::string& of, const std::strin
 }
 
 TEST(SavedPolicy, RefusesNumbersThatAreNoCounts) {
-  for (const char* name : {"\"hidden\":[4]", "\"action_dim\":4", "\"observation_dim\":6",
-                           "\"layout\":{\"action_start\":[7]}"}) {
+  for (const char* name : {R"("hidden":[4])", R"("action_dim":4)", R"("observation_dim":6)",
+                           R"("layout":{"action_start":[7]})"}) {
     const std::string of = name;
     const std::size_t number = of.find_first_of("0123456789");
-    for (const char* instead : {"-1.7e308", "4.5", "1e300", "4294967300", "true", "\"4\""}) {
+    for (const char* instead : {"-1.7e308", "4.5", "1e300", "4294967300", "true", R"("4")"}) {
       const std::string wrong = of.substr(0, number) + instead + of.substr(number + 1);
       if (of.find("start") != std::string::npos && wrong.find("4294967300") != std::string::npos)
         continue;  // spaces may start there
@@ -80,7 +80,7 @@ TEST(SavedPolicy, RefusesNumbersThatAreNoCounts) {
 
 // Before there is memory for them.
 TEST(SavedPolicy, RefusesAStructureOfMoreWeightsThanTheFileHas) {
-  const auto bytes = with_structure("\"hidden\":[4]", "\"hidden\":[1048576,1048576]");
+  const auto bytes = with_structure(R"("hidden":[4])", R"("hidden":[1048576,1048576])");
   EXPECT_THAT(input_error([&] { SavedPolicy::decode(bytes, "p"); }), HasSubstr("more weights"));
 }
 

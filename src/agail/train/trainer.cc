@@ -19,7 +19,7 @@ constexpr std::int64_t kExploringRounds = 6, kExploringEpochs = 60;
 // the held-out ones.
 std::uint64_t memory_to_fit(Index n, Index inputs, const Sizes& hidden, const ActionSpace& action,
                             double validation_share) {
-  const auto step = static_cast<double>(inputs + 1 + 2 * action.dim);
+  const auto step = static_cast<double>(inputs + 1 + Index{2} * action.dim);
   const double layers = static_cast<double>(action.encoded_dim()) +
                         std::accumulate(hidden.begin(), hidden.end(), 0.0);
   return static_cast<std::uint64_t>(sizeof(float) * static_cast<double>(n) *
