@@ -47,7 +47,7 @@ void tell_tables(const std::filesystem::path& out) {
   std::cout << (out / "table.md").string() << ": " << runs << " runs\n";
 }
 
-void run(Options options) {
+void run(const Options& options) {
   namespace fs = std::filesystem;
   if (options.experiment != "table1")
     throw InputError("no experiment '" + options.experiment + "'; did you mean 'table1'?");

@@ -132,7 +132,8 @@ ordered_json metadata_of(const Demonstrations& demonstrations) {
   // A spec of the source is kept (its arguments may matter) while it is of this environment. An
   // empty one is none.
   bool keeps_spec = false;
-  if (source.contains("env_spec") && source["env_spec"].is_string() && source["env_spec"] != "") {
+  if (source.contains("env_spec") && source["env_spec"].is_string() &&
+      !source["env_spec"].get<std::string>().empty()) {
     const json spec = parse_python_json(source["env_spec"].get<std::string>(), "env_spec");
     keeps_spec = spec.is_object() && spec.value("id", json()) == environment;
   }
