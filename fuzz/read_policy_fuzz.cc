@@ -11,12 +11,13 @@
 #include "agail/base/error.h"
 #include "agail/train/safetensors.h"
 #include "agail/train/saved_policy.h"
+#include "train/plain_policy.h"
 
 namespace {
 
 using nlohmann::json;
 
-agail::TensorStore plain_policy(bool discrete) {
+agail::TensorStore start(bool discrete) {
   agail::ActionSpace action;
   action.discrete = discrete;
   if (discrete) {
@@ -26,14 +27,7 @@ agail::TensorStore plain_policy(bool discrete) {
     action.low = {-1, -2};
     action.high = {1, 2};
   }
-  constexpr int kObservations = 3;
-  const agail::Sizes hidden = {4};
-  const agail::PolicyNetwork<float> network(kObservations, hidden, action);
-  const agail::SavedPolicy policy({"CartPole-v1", "agail", 7, "", 1.0, {}}, kObservations, action,
-                                  hidden, agail::Normalizer(kObservations, true, 5),
-                                  agail::Vector<double>::Ones(kObservations),
-                                  agail::Vector<float>::Zero(network.parameters()));
-  return policy.store();
+  return agail::plain_policy({"CartPole-v1", "agail", 7, "", 1.0, {}}, 3, action, true).store();
 }
 
 // Of ASCII: what is not UTF-8 cannot be written.
@@ -85,7 +79,7 @@ void change(FuzzedDataProvider& data, agail::TensorStore& store) {
       json structure = json::parse(store.metadata["structure"], nullptr, false);
       if (!structure.is_object()) break;
       structure[data.PickValueInArray(kKeys)] = number_or_so(data);
-      store.metadata["structure"] = structure.dump(-1, ' ', false, json::error_handler_t::replace);
+      store.metadata["structure"] = structure.dump();
       break;
     }
     case 2:
@@ -107,7 +101,7 @@ void change(FuzzedDataProvider& data, agail::TensorStore& store) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   FuzzedDataProvider data(bytes, size);
-  agail::TensorStore store = plain_policy(data.ConsumeBool());
+  agail::TensorStore store = start(data.ConsumeBool());
   while (data.remaining_bytes() > 0) change(data, store);
   try {
     const agail::SavedPolicy policy =

@@ -2,12 +2,13 @@
 // InputError. The .npz file itself is whole: mutations of one would end at its checksums.
 #include <fuzzer/FuzzedDataProvider.h>
 #include <unistd.h>
-#include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "agail/base/atomic_file.h"
@@ -15,53 +16,9 @@
 #include "agail/demos/csv_table.h"
 #include "agail/demos/minari_writer.h"
 #include "agail/demos/npz_table.h"
+#include "demos/npz_bytes.h"
 
 namespace {
-
-// A number of ZIP's, `width` bytes from the lowest on.
-void put(std::string& bytes, std::size_t value, int width) {
-  for (int i = 0; i < width; ++i) bytes.push_back(static_cast<char>(value >> 8 * i & 255));
-}
-
-struct Member {
-  std::string name, contents;
-};
-
-std::string zip(const std::vector<Member>& members) {
-  std::string bytes, directory;
-  for (const Member& member : members) {
-    std::string common;  // to the local header and the directory
-    put(common, 20, 2);  // version needed
-    put(common, 0, 8);   // flags, stored as it is, time, date
-    put(common,
-        crc32(0, reinterpret_cast<const Bytef*>(member.contents.data()),
-              static_cast<uInt>(member.contents.size())),
-        4);
-    put(common, member.contents.size(), 4);
-    put(common, member.contents.size(), 4);
-    put(common, member.name.size(), 2);
-    put(common, 0, 2);  // further fields
-    put(directory, 0x02014b50, 4);
-    put(directory, 20, 2);
-    directory += common;
-    put(directory, 0, 4);  // comment, disk
-    put(directory, 0, 6);  // attributes
-    put(directory, bytes.size(), 4);
-    directory += member.name;
-    put(bytes, 0x04034b50, 4);
-    bytes += common + member.name + member.contents;
-  }
-  const std::size_t begin = bytes.size();
-  bytes += directory;
-  put(bytes, 0x06054b50, 4);
-  put(bytes, 0, 4);  // disks
-  put(bytes, members.size(), 2);
-  put(bytes, members.size(), 2);
-  put(bytes, directory.size(), 4);
-  put(bytes, begin, 4);
-  put(bytes, 0, 2);
-  return bytes;
-}
 
 // An array as numpy writes it, or any bytes.
 std::string array(FuzzedDataProvider& data) {
@@ -75,17 +32,12 @@ std::string array(FuzzedDataProvider& data) {
   const Type type = data.PickValueInArray(kTypes);
   const auto rows = data.ConsumeIntegralInRange<std::size_t>(0, 9);
   const auto columns = data.ConsumeIntegralInRange<std::size_t>(0, 4);  // 0: a vector
-  std::string shape = "(" + std::to_string(rows) + ",";
-  if (columns > 0) shape += " " + std::to_string(columns);
-  const std::string header = std::string("{'descr': '") + type.name +
-                             "', 'fortran_order': False, 'shape': " + shape + "), }\n";
-  std::string bytes("\x93NUMPY\x01\x00", 8);
-  put(bytes, header.size(), 2);
-  bytes += header;
+  const std::string shape =
+      "(" + std::to_string(rows) + "," + (columns > 0 ? " " + std::to_string(columns) : "") + ")";
   std::string values =
       data.ConsumeBytesAsString(rows * std::max<std::size_t>(columns, 1) * type.width);
   values.resize(rows * std::max<std::size_t>(columns, 1) * type.width);
-  return bytes + values;
+  return agail::npy(type.name, shape, values);
 }
 
 std::string npz(FuzzedDataProvider& data) {
@@ -93,10 +45,10 @@ std::string npz(FuzzedDataProvider& data) {
       "observations", "actions",     "action_available", "next_observations", "rewards",
       "terminations", "truncations", "episodes",         "episode_starts",    "episode_ends",
       "other"};
-  std::vector<Member> members = {{"observations.npy", array(data)}};
+  std::vector<std::pair<std::string, std::string>> members = {{"observations.npy", array(data)}};
   while (data.remaining_bytes() > 0 && members.size() < 8)
     members.push_back({std::string(data.PickValueInArray(kNames)) + ".npy", array(data)});
-  return zip(members);
+  return agail::zip(members);
 }
 
 }  // namespace
